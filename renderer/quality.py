@@ -1,0 +1,51 @@
+"""What a frame may cost: cells, samples, depth."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from renderer.acuity import Acuity
+from renderer.errors import require_choice, require_integer
+
+MAPS = ("aligned", "scanline", "full")
+ANTIALIASING = ("stochastic", "regular")
+RECONSTRUCTIONS = ("nearest",)
+MAX_SAMPLES = 4096
+MAX_DEPTH = 64
+MAX_BUCKET_PX = 512
+
+
+@dataclass(frozen=True, slots=True)
+class Quality:
+    """How a frame is sampled.
+
+    Attributes:
+        map: tiling of the screen into cells: `aligned` (default), `scanline` (the paper's) or `full`
+            (one cell a pixel, the reference).
+        gaze_bucket_px: side of the squares of gaze that share a map [px], 0 for the exact gaze.
+        samples_per_cell: rays sent from the camera for each cell, 1 to 4096.
+        antialiasing: where they go: the first to the cell's centre, the rest at `stochastic` or
+            `regular` places over the cell's area.
+        max_depth: how many mirrors and boundaries a ray may meet, 0 to 64.
+        acuity: the eye's resolution.
+        reconstruction: how cells become pixels.
+
+    Raises:
+        SettingsError: naming the field, for a value out of range.
+    """
+
+    map: str = "aligned"
+    gaze_bucket_px: int = 16
+    samples_per_cell: int = 4
+    antialiasing: str = "stochastic"
+    max_depth: int = 5
+    acuity: Acuity = field(default_factory=Acuity)
+    reconstruction: str = "nearest"
+
+    def __post_init__(self) -> None:
+        require_choice("quality.map", self.map, MAPS)
+        require_integer("quality.gaze_bucket_px", self.gaze_bucket_px, 0, MAX_BUCKET_PX)
+        require_integer("quality.samples_per_cell", self.samples_per_cell, 1, MAX_SAMPLES)
+        require_choice("quality.antialiasing", self.antialiasing, ANTIALIASING)
+        require_integer("quality.max_depth", self.max_depth, 0, MAX_DEPTH)
+        require_choice("quality.reconstruction", self.reconstruction, RECONSTRUCTIONS)

@@ -1,0 +1,107 @@
+"""Threads that share the cores between frames.
+
+Work comes as jobs of many blocks. Workers take one block of each job in turn, so that a small frame is
+not kept waiting by a large one that came first. Blocks run compiled code without the interpreter lock.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections import deque
+from collections.abc import Callable
+
+
+class _Job:
+    """Blocks 0 .. count-1 of one task; `taken` and `finished` are guarded by the pool's condition."""
+
+    def __init__(self, task: Callable[[int], None], count: int) -> None:
+        self.task = task
+        self.count = count
+        self.taken = 0
+        self.finished = 0
+        self.error: BaseException | None = None
+        self.done = threading.Event()
+
+
+class WorkerPool:
+    """A fixed number of threads that run the blocks of jobs, one block of each job in turn."""
+
+    def __init__(self, threads: int | None = None) -> None:
+        self.threads = threads if threads is not None else available_cores()
+        if self.threads < 1:
+            raise ValueError(f"a worker pool needs at least one thread, not {self.threads}")
+        self._jobs: deque[_Job] = deque()
+        self._changed = threading.Condition()
+        self._closed = False
+        self._members = [
+            threading.Thread(target=self._work, name=f"render-{index}", daemon=True) for index in range(self.threads)
+        ]
+        for member in self._members:
+            member.start()
+
+    def run(self, task: Callable[[int], None], count: int) -> None:
+        """Call `task(0)` .. `task(count - 1)` on the workers and return when all have finished.
+
+        The first exception of a block stops the blocks not yet begun and is raised here.
+        Must not be called from a block.
+        """
+        if count == 0:
+            return
+        job = _Job(task, count)
+        with self._changed:
+            if self._closed:
+                raise RuntimeError("the worker pool is closed")
+            self._jobs.append(job)
+            self._changed.notify_all()
+        job.done.wait()
+        if job.error is not None:
+            raise job.error
+
+    def close(self) -> None:
+        """Let the jobs that were begun finish, then end the threads."""
+        with self._changed:
+            self._closed = True
+            self._changed.notify_all()
+        for member in self._members:
+            member.join()
+
+    def _work(self) -> None:
+        while self._run_next_block():
+            pass
+
+    def _run_next_block(self) -> bool:
+        """Wait for a block and run it; False when the pool is closed and nothing is left to do.
+
+        A call of its own, so that an idle worker holds on to no job, and so to none of its arrays.
+        """
+        with self._changed:
+            while not self._jobs:
+                if self._closed:
+                    return False
+                self._changed.wait()
+            job = self._jobs.popleft()
+            block = job.taken
+            job.taken += 1
+            if job.taken < job.count:
+                self._jobs.append(job)
+        error: BaseException | None = None
+        try:
+            job.task(block)
+        except BaseException as problem:
+            error = problem
+        with self._changed:
+            if error is not None and job.error is None:
+                job.error = error
+                if job in self._jobs:
+                    self._jobs.remove(job)
+                job.count = job.taken
+            job.finished += 1
+            if job.finished == job.count:
+                job.done.set()
+        return True
+
+
+def available_cores() -> int:
+    """Cores this process may run on."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
