@@ -1,0 +1,154 @@
+"""What a frame costs beside what bounds it: bare Embree time for the same rays, on all cores.
+
+Frame and yardstick are timed in turn within one run, so that a machine whose speed drifts does not
+favour one of them; figures are medians with their range, and ratios are taken pair by pair.
+"""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.cellmap import build_cell_map
+from renderer.frame import FrameRequest, RayCounts
+from renderer.gaze import Gaze, bucket_of
+from renderer.intersection import Intersector
+from renderer.pipeline import Renderer
+from renderer.prepared import PreparedScene
+from renderer.rays import Hits
+from renderer.workers import WorkerPool
+
+GAZE_STEP_PX = 20.0
+"""Move of the gaze whose cost is measured [px]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """One measured quantity.
+
+    Attributes:
+        name: what was measured.
+        median, low, high: over the repeats.
+        unit: `ms` or `ratio`.
+    """
+
+    name: str
+    median: float
+    low: float
+    high: float
+    unit: str
+
+
+@dataclass(frozen=True, slots=True)
+class Benchmark:
+    """Figures for one frame of one scene.
+
+    Attributes:
+        cells: of its map.
+        rays: traced for the whole frame.
+        threads: used by frame and yardstick alike.
+        figures: times and ratios.
+    """
+
+    cells: int
+    rays: RayCounts
+    threads: int
+    figures: tuple[Figure, ...]
+
+
+class _RecordingIntersector:
+    """Answers like the intersector it stands for, and keeps the rays it was asked about."""
+
+    def __init__(self, intersector: Intersector) -> None:
+        self._intersector = intersector
+        self.nearest_rays: list[tuple[NDArray[np.float32], NDArray[np.float32]]] = []
+        self.shadow_rays: list[tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]] = []
+
+    def nearest(self, origin: NDArray[np.float32], direction: NDArray[np.float32]) -> Hits:
+        self.nearest_rays.append((origin.copy(), direction.copy()))
+        return self._intersector.nearest(origin, direction)
+
+    def occluded(
+        self, origin: NDArray[np.float32], direction: NDArray[np.float32], reach: NDArray[np.float32]
+    ) -> NDArray[np.uint8]:
+        self.shadow_rays.append((origin.copy(), direction.copy(), reach.copy()))
+        return self._intersector.occluded(origin, direction, reach)
+
+
+def measure_frame(
+    renderer: Renderer, prepared: PreparedScene, request: FrameRequest, repeats: int, tick: Callable[[], None]
+) -> Benchmark:
+    """Time one frame traced anew, its stages and its variants, against bare Embree time for its rays.
+
+    Args:
+        renderer: its caches are emptied.
+        prepared: a scene with triangles.
+        request: the frame.
+        repeats: how often each is timed, 1 or more.
+        tick: called after each repeat, for a progress bar.
+    """
+    recorder = _RecordingIntersector(prepared.intersector)
+    renderer.forget_samples()
+    first = renderer.render(replace(prepared, intersector=recorder), request)  # type: ignore[arg-type]
+    pool = WorkerPool(renderer.threads)
+    moved = replace(request, gaze=Gaze(request.gaze.x + GAZE_STEP_PX, request.gaze.y))
+    times: dict[str, list[float]] = {}
+
+    def timed(name: str, action: Callable[[], object]) -> None:
+        began = time.perf_counter()
+        action()
+        times.setdefault(name, []).append(1e3 * (time.perf_counter() - began))
+
+    renderer.render(prepared, moved)
+    for _ in range(repeats):
+        renderer.forget_samples()
+        timed("whole frame, map cached, traced anew", lambda: renderer.render(prepared, request))
+        timed("bare Embree, same rays, all cores", lambda: _trace_bare(prepared.intersector, recorder, pool))
+        timed("frame after a gaze move of 20 px", lambda: renderer.render(prepared, moved))
+        timed("frame again, everything stored", lambda: renderer.render(prepared, request))
+        timed("cell map", lambda: _build_map(request, pool))
+        tick()
+    pool.close()
+    return Benchmark(first.cost.cells, first.cost.rays, renderer.threads, _figures(times))
+
+
+def _build_map(request: FrameRequest, pool: WorkerPool) -> None:
+    quality = request.quality
+    bucket = bucket_of(request.gaze, quality.gaze_bucket_px)
+    build_cell_map(quality.map, request.display, quality.acuity, bucket, pool)
+
+
+def _trace_bare(intersector: Intersector, recorder: _RecordingIntersector, pool: WorkerPool) -> None:
+    """Put the recorded rays through Embree alone, batch by batch on all threads."""
+    nearest, shadow = recorder.nearest_rays, recorder.shadow_rays
+    reaches = [reach.copy() for _, _, reach in shadow]
+
+    def trace(batch: int) -> None:
+        if batch < len(nearest):
+            intersector.bare_nearest(*nearest[batch])
+        else:
+            origin, direction, _ = shadow[batch - len(nearest)]
+            intersector.bare_occluded(origin, direction, reaches[batch - len(nearest)])
+
+    pool.run(trace, len(nearest) + len(shadow))
+
+
+def _figures(times: dict[str, list[float]]) -> tuple[Figure, ...]:
+    figures = [
+        Figure(name, statistics.median(series), min(series), max(series), "ms") for name, series in times.items()
+    ]
+    frame = times["whole frame, map cached, traced anew"]
+    for name, label in (
+        ("bare Embree, same rays, all cores", "whole frame / bare Embree"),
+        ("frame after a gaze move of 20 px", "gaze move / whole frame"),
+        ("cell map", "cell map / whole frame"),
+    ):
+        inverse = name.startswith("bare")
+        ratios = [a / b if inverse else b / a for a, b in zip(frame, times[name], strict=True)]
+        figures.append(Figure(label, statistics.median(ratios), min(ratios), max(ratios), "ratio"))
+    return tuple(figures)

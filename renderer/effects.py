@@ -1,0 +1,105 @@
+"""The effect plan: what a scene calls for, and therefore which rays exist.
+
+Only content that can be seen or can cast a shadow counts: a material that no face has, a light that is
+black, a texture that nothing looks up call for nothing.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+
+from renderer.scene import BLACK, Material, Scene
+
+
+@dataclass(frozen=True, slots=True)
+class Effect:
+    """One effect of the tracer.
+
+    Attributes:
+        name: `shadows`, `specular`, `textures`, `reflection` or `refraction`.
+        reason: what in the scene calls for it, one line.
+    """
+
+    name: str
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class EffectPlan:
+    """The effects a scene calls for, in the order in which a ray meets them."""
+
+    effects: tuple[Effect, ...]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the effects."""
+        return tuple(effect.name for effect in self.effects)
+
+
+def plan_effects(scene: Scene) -> EffectPlan:
+    """What `scene` calls for, with the reason of each effect."""
+    users = _material_users(scene)
+    effects = []
+    for name, calls in (
+        ("textures", lambda material: material.diffuse_texture is not None and material.diffuse != BLACK),
+        ("specular", lambda material: material.specular != BLACK and bool(_lit(scene))),
+        ("shadows", lambda material: _takes_light(material) and bool(_shadow_lights(scene)) and _casters(scene) > 0),
+        ("reflection", lambda material: material.reflection != BLACK or _is_boundary(material)),
+        ("refraction", lambda material: material.transmission != BLACK),
+    ):
+        called_by = [material for material in users if calls(material)]
+        if called_by:
+            effects.append(Effect(name, _reason(name, scene, called_by, users)))
+    return EffectPlan(tuple(effects))
+
+
+def _material_users(scene: Scene) -> dict[Material, Counter[str]]:
+    """Materials that something visible has, with how many triangles and spheres have them."""
+    users: dict[Material, Counter[str]] = {}
+    for mesh in scene.meshes:
+        if len(mesh.faces):
+            users.setdefault(mesh.material, Counter())["triangle"] += len(mesh.faces)
+    for sphere in scene.spheres:
+        users.setdefault(sphere.material, Counter())["sphere"] += 1
+    return users
+
+
+def _lit(scene: Scene) -> list[str]:
+    return ["light" for light in scene.lights if light.intensity != BLACK]
+
+
+def _shadow_lights(scene: Scene) -> list[str]:
+    return ["light" for light in scene.lights if light.intensity != BLACK and light.casts_shadows]
+
+
+def _casters(scene: Scene) -> int:
+    meshes = sum(1 for mesh in scene.meshes if mesh.casts_shadows and len(mesh.faces))
+    return meshes + sum(1 for sphere in scene.spheres if sphere.casts_shadows)
+
+
+def _takes_light(material: Material) -> bool:
+    return material.diffuse != BLACK or material.specular != BLACK
+
+
+def _is_boundary(material: Material) -> bool:
+    """Whether Fresnel's equations mirror a part of the light (not where the index stays the same)."""
+    return material.transmission != BLACK and material.ior != 1.0
+
+
+def _reason(
+    name: str, scene: Scene, called_by: list[Material], users: dict[Material, Counter[str]]
+) -> str:
+    if name == "shadows":
+        return f"{_count(len(_shadow_lights(scene)), 'light')}, {_count(_casters(scene), 'shadow-casting object')}"
+    parts = []
+    for material in called_by[:3]:
+        bearers = " and ".join(_count(number, kind) for kind, number in sorted(users[material].items()))
+        parts.append(f"{bearers} of material {material.name!r}")
+    if len(called_by) > 3:
+        parts.append(_count(len(called_by) - 3, "more material"))
+    return "; ".join(parts)
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"

@@ -1,0 +1,103 @@
+"""A finished frame, and what it cost."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.camera import Camera
+from renderer.display import Display
+from renderer.gaze import Gaze
+from renderer.quality import Quality
+
+
+@dataclass(frozen=True, slots=True)
+class FrameRequest:
+    """What to render, besides the scene itself.
+
+    Attributes:
+        gaze: where the eye looks [px].
+        display: the screen.
+        camera: the view; None for the scene's own.
+        quality: what it may cost.
+        linear: True for float32 linear radiance in place of the 8-bit picture.
+    """
+
+    gaze: Gaze
+    display: Display
+    camera: Camera | None
+    quality: Quality
+    linear: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class RayCounts:
+    """Rays traced, by kind."""
+
+    primary: int = 0
+    shadow: int = 0
+    reflection: int = 0
+    refraction: int = 0
+
+    @property
+    def total(self) -> int:
+        """All rays."""
+        return self.primary + self.shadow + self.reflection + self.refraction
+
+
+@dataclass(frozen=True, slots=True)
+class StageTimes:
+    """Wall-clock time of each stage [ms]."""
+
+    map: float
+    trace: float
+    reconstruct: float
+
+
+@dataclass(frozen=True, slots=True)
+class FrameCost:
+    """What a frame took.
+
+    Attributes:
+        map: tiling used.
+        cells: cells of the map.
+        bucket_px: side of the gaze bucket [px].
+        map_cached: whether the map came from the cache.
+        samples_per_cell: camera rays a cell.
+        cells_traced, cells_reused: cells traced for this frame, and taken from the sample store.
+        rays: rays traced for this frame.
+        effects: names of the effects that the scene calls for and that ran.
+        rms_error, foveal_rms_error: estimated standard error of the linear frame over the screen and
+            within 2.5 deg of the gaze; None with fewer than two samples a cell (or nothing there).
+        rejected_samples: samples that were not finite and count as black; 0 unless something is broken.
+        time_ms: stages.
+    """
+
+    map: str
+    cells: int
+    bucket_px: int
+    map_cached: bool
+    samples_per_cell: int
+    cells_traced: int
+    cells_reused: int
+    rays: RayCounts
+    effects: tuple[str, ...]
+    rms_error: float | None
+    foveal_rms_error: float | None
+    rejected_samples: int
+    time_ms: StageTimes
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Frame:
+    """A picture and its cost.
+
+    Attributes:
+        pixels: (h, w, 3), uint8 sRGB, or float32 linear Rec.709 radiance where the request says `linear`.
+        cost: what it took.
+    """
+
+    pixels: NDArray[np.uint8] | NDArray[np.float32]
+    cost: FrameCost

@@ -1,0 +1,41 @@
+"""Reflection and refraction at a smooth boundary: Snell's law and Fresnel's equations, unpolarised."""
+
+from __future__ import annotations
+
+import math
+
+from renderer.kernel import formula
+
+
+@formula
+def refracted_cosine(cosine: float, eta: float) -> float:
+    """Cosine of the refracted angle; 0 or less under total internal reflection.
+
+    Args:
+        cosine: of the angle of incidence, 0 to 1 (clamped).
+        eta: index of refraction on the incident side over that behind the boundary.
+
+    The radicand is formed from (1 - c)(1 + c), which keeps its digits near normal incidence.
+    """
+    c = max(0.0, min(1.0, cosine))
+    radicand = 1.0 - eta * eta * ((1.0 - c) * (1.0 + c))
+    return math.sqrt(radicand) if radicand > 0.0 else -1.0
+
+
+@formula
+def fresnel(cosine: float, refracted: float, eta: float) -> float:
+    """Share of unpolarised light that a dielectric boundary reflects, 0 to 1 (Born and Wolf 1999, sec. 1.5.2).
+
+    Args:
+        cosine, refracted: cosines of the angles of incidence and refraction; `refracted` 0 or less means
+            total internal reflection.
+        eta: index of refraction on the incident side over that behind the boundary.
+    """
+    if refracted <= 0.0:
+        return 1.0
+    if eta == 1.0:
+        return 0.0
+    c = max(0.0, min(1.0, cosine))
+    parallel = (c - eta * refracted) / (c + eta * refracted)
+    perpendicular = (eta * c - refracted) / (eta * c + refracted)
+    return 0.5 * (parallel * parallel + perpendicular * perpendicular)

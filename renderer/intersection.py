@@ -1,0 +1,122 @@
+"""What a ray meets: triangles through Embree, spheres through their own tree.
+
+The only file that talks to Embree. embreex checks no bounds, wants float32 C-contiguous arrays of equal
+length, overwrites a distance array it is given, and builds its tree at the first query; all of that is
+dealt with here.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from embreex.mesh_construction import TriangleMesh
+from embreex.rtcore_scene import EmbreeScene
+from numpy.typing import NDArray
+
+from renderer.kernel import kernel
+from renderer.rays import Hits
+from renderer.sphere import SphereTree, nearest_spheres, shade_spheres
+
+
+class Intersector:
+    """Nearest-hit and occlusion queries against triangles and spheres; any number of threads may ask at once."""
+
+    def __init__(
+        self,
+        vertices: NDArray[np.float32],
+        faces: NDArray[np.int32],
+        casts: NDArray[np.bool_],
+        spheres: SphereTree,
+    ) -> None:
+        """Build the search structures.
+
+        Args:
+            vertices: (n, 3) float32 finite positions.
+            faces: (m, 3) int32 vertex indices in range.
+            casts: (m,) bool, True where the triangle casts shadows.
+            spheres: the spheres.
+        """
+        assert vertices.dtype == np.float32 and vertices.ndim == 2 and vertices.shape[1] == 3
+        assert faces.dtype == np.int32 and faces.ndim == 2 and faces.shape[1] == 3 and len(casts) == len(faces)
+        self.triangles = len(faces)
+        self._spheres = spheres
+        self._seen = _embree_scene(vertices, faces)
+        self._casting = self._seen if casts.all() else _embree_scene(vertices, faces[casts])
+        self._sphere_casts = bool(spheres.casts.any())
+
+    def nearest(self, origin: NDArray[np.float32], direction: NDArray[np.float32]) -> Hits:
+        """Nearest hit of each ray.
+
+        Args:
+            origin, direction: (n, 3) float32, C-contiguous, finite.
+        """
+        n = _checked_length(origin, direction)
+        if self._seen is None:
+            hits = Hits(
+                primitive=np.full(n, -1, dtype=np.int32),
+                distance=np.full(n, np.inf, dtype=np.float32),
+                u=np.zeros(n, dtype=np.float32),
+                v=np.zeros(n, dtype=np.float32),
+            )
+        else:
+            found = self._seen.run(origin, direction, None, "INTERSECT", output=True)
+            hits = Hits(primitive=found["primID"], distance=found["tfar"], u=found["u"], v=found["v"])
+        if len(self._spheres.radius):
+            nearest_spheres(self._spheres, origin, direction, self.triangles, hits.distance, hits.primitive)
+        return hits
+
+    def bare_nearest(self, origin: NDArray[np.float32], direction: NDArray[np.float32]) -> None:
+        """Embree's own nearest-hit query and nothing else: the yardstick of the benchmark."""
+        if self._seen is not None:
+            self._seen.run(origin, direction, None, "INTERSECT", output=True)
+
+    def bare_occluded(
+        self, origin: NDArray[np.float32], direction: NDArray[np.float32], reach: NDArray[np.float32]
+    ) -> None:
+        """Embree's own occlusion query and nothing else; the values of `reach` are lost."""
+        if self._casting is not None:
+            self._casting.run(origin, direction, reach, "OCCLUDED")
+
+    def occluded(
+        self, origin: NDArray[np.float32], direction: NDArray[np.float32], reach: NDArray[np.float32]
+    ) -> NDArray[np.uint8]:
+        """Which shadow rays are blocked: (n,) uint8, 1 where something that casts shadows is nearer than `reach`.
+
+        Args:
+            origin, direction: (n, 3) float32, C-contiguous, finite.
+            reach: (n,) float32; its values are lost.
+        """
+        n = _checked_length(origin, direction)
+        assert reach.dtype == np.float32 and reach.shape == (n,)
+        blocked = np.zeros(n, dtype=np.uint8)
+        limit = reach.copy() if self._sphere_casts and self._casting is not None else reach
+        if self._casting is not None:
+            _mark_blocked(self._casting.run(origin, direction, limit, "OCCLUDED"), blocked)
+        if self._sphere_casts:
+            shade_spheres(self._spheres, origin, direction, reach, blocked)
+        return blocked
+
+
+def _embree_scene(vertices: NDArray[np.float32], faces: NDArray[np.int32]) -> EmbreeScene | None:
+    """An Embree scene, robust mode, built; None where there is nothing to hit."""
+    if len(faces) == 0:
+        return None
+    scene = EmbreeScene(robust=True)
+    TriangleMesh(scene, np.ascontiguousarray(vertices), np.ascontiguousarray(faces))
+    probe = np.zeros((1, 3), dtype=np.float32)
+    scene.run(probe, np.array([[0, 0, 1]], dtype=np.float32), None, "INTERSECT")
+    return scene
+
+
+def _checked_length(origin: NDArray[np.float32], direction: NDArray[np.float32]) -> int:
+    n = len(origin)
+    for rays in (origin, direction):
+        if rays.dtype != np.float32 or rays.shape != (n, 3) or not rays.flags.c_contiguous:
+            raise ValueError(f"expected ({n}, 3) contiguous float32 rays, found {rays.shape} {rays.dtype}")
+    return n
+
+
+@kernel
+def _mark_blocked(answers: NDArray[np.int32], blocked: NDArray[np.uint8]) -> None:
+    """Embree answers 0 for a blocked ray and -1 for a clear one."""
+    for ray in range(len(blocked)):
+        blocked[ray] = 1 if answers[ray] == 0 else 0

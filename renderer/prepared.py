@@ -1,0 +1,291 @@
+"""The scene as the kernels read it: re-centred, scaled to about unit size, in flat arrays.
+
+Positions are moved to the middle of the geometry in float64 and scaled by a power of two before they
+become float32, so that neither a far nor a tiny or giant scene loses digits to its place or its unit.
+Degenerate triangles and exact copies are left out: they show nothing and slow every ray.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.effects import EffectPlan, plan_effects
+from renderer.errors import SceneError
+from renderer.intersection import Intersector
+from renderer.scene import Material, Mesh, Scene, Texture
+from renderer.sphere import SphereTree, build_sphere_tree
+from renderer.texture import TextureAtlas, build_atlas
+
+FACET = 32
+"""Numbers a triangle takes: 128 bytes."""
+
+MATERIAL_COLUMN = 24
+SMOOTH_COLUMN = 25
+
+SPECULAR = 1
+MIRROR = 2
+BOUNDARY = 4
+LIT = 8
+"""Bits of what a material calls for."""
+
+
+MATERIAL = np.dtype(
+    [(f"{name}_{channel}", np.float32) for name in ("diffuse", "specular", "emission", "reflection", "transmission")
+     for channel in ("red", "green", "blue")]
+    + [("shininess", np.float32), ("ior", np.float32), ("picture", np.int32), ("calls", np.int32)]
+)  # fmt: skip
+"""One material as the kernels read it; `picture` is -1 without a texture, `calls` are the bits above."""
+
+LIGHT = np.dtype(
+    [("x", np.float64), ("y", np.float64), ("z", np.float64)]
+    + [("red", np.float64), ("green", np.float64), ("blue", np.float64), ("casts", np.int64)]
+)
+"""One point light in scene units; `casts` is 1 where shadow rays are to be traced."""
+
+
+class Surfaces(NamedTuple):
+    """Everything the shading kernels read of a scene.
+
+    Attributes:
+        facets: (m, FACET) float32, one triangle each, in two cache lines: for each of its three corners
+            position, unit normal and texture coordinates, then the row of its material, and 1 where
+            the corner normals are not the triangle's own.
+        spheres: analytic spheres.
+        materials: (k,) MATERIAL, each that something visible has.
+        lights: (l,) LIGHT, each that shines.
+        surroundings: (3, 3) float64 radiance at the zenith, at the horizon, and from everywhere.
+        textures: pictures.
+    """
+
+    facets: NDArray[np.float32]
+    spheres: SphereTree
+    materials: NDArray[np.void]
+    lights: NDArray[np.void]
+    surroundings: NDArray[np.float64]
+    textures: TextureAtlas
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class PreparedScene:
+    """A scene ready to be traced.
+
+    Attributes:
+        scene: as its author stated it.
+        plan: the effects it calls for.
+        center: (3,) float64 world position of the scene-unit origin [m].
+        scale: scene units per metre, a power of two.
+        brightest: largest radiance that something sends out by itself; highlights of lights may be brighter.
+        surfaces: what the kernels read.
+        intersector: what answers rays.
+        nbytes: approximate size in memory.
+    """
+
+    scene: Scene
+    plan: EffectPlan
+    center: NDArray[np.float64]
+    scale: float
+    brightest: float
+    surfaces: Surfaces
+    intersector: Intersector
+    nbytes: int
+
+
+EMBREE_BYTES_A_TRIANGLE = 150
+"""Rough size of Embree's tree and vertex copy, for the bound on cached scenes [byte]."""
+
+
+def prepare(scene: Scene) -> PreparedScene:
+    """Turn a scene into what the kernels read.
+
+    Raises:
+        SceneError: where it is too far spread out for float32.
+    """
+    plan = plan_effects(scene)
+    center, scale = _centre_and_scale(scene)
+    materials = _used_materials(scene)
+    textures = list(dict.fromkeys(material.diffuse_texture for material in materials if material.diffuse_texture))
+    row = {material: index for index, material in enumerate(materials)}
+    vertices, faces, facets, casts = _triangles(scene, row, center, scale)
+    spheres = build_sphere_tree(
+        (np.array([sphere.center for sphere in scene.spheres]).reshape(-1, 3) - center) * scale,
+        np.array([sphere.radius for sphere in scene.spheres], dtype=np.float64) * scale,
+        np.array([row[sphere.material] for sphere in scene.spheres], dtype=np.int32),
+        np.array([sphere.casts_shadows for sphere in scene.spheres], dtype=np.uint8),
+    )
+    surfaces = Surfaces(
+        facets=facets,
+        spheres=spheres,
+        materials=_material_table(materials, textures, plan),
+        textures=build_atlas(textures),
+        lights=_light_table(scene, plan, center, scale),
+        surroundings=np.array(
+            [scene.surroundings.zenith, scene.surroundings.horizon, scene.surroundings.ambient], dtype=np.float64
+        ),
+    )
+    intersector = Intersector(vertices, faces, casts, spheres)
+    nbytes = facets.nbytes + surfaces.textures.texels.nbytes + EMBREE_BYTES_A_TRIANGLE * len(faces)
+    nbytes += sum(mesh.vertices.nbytes + mesh.faces.nbytes for mesh in scene.meshes)
+    brightest = max(itertools.chain(scene.surroundings.zenith, scene.surroundings.horizon,
+                                    *(material.emission for material in materials)))  # fmt: skip
+    return PreparedScene(scene, plan, center, scale, brightest, surfaces, intersector, nbytes)
+
+
+def _centre_and_scale(scene: Scene) -> tuple[NDArray[np.float64], float]:
+    """Middle of the geometry and the power of two that makes its half extent about 1.
+
+    Spheres are traced in float64 and count only where there are no triangles; digits are then needed
+    most around the smallest one, which may lie on one as large as the Earth.
+    """
+    boxes = [(mesh.vertices[mesh.faces].min((0, 1)), mesh.vertices[mesh.faces].max((0, 1)))
+             for mesh in scene.meshes if len(mesh.faces)]  # fmt: skip
+    if not boxes:
+        boxes = [(np.subtract(s.center, s.radius), np.add(s.center, s.radius)) for s in scene.spheres]
+    if not boxes:
+        return np.zeros(3), 1.0
+    low = np.min([box[0] for box in boxes], axis=0)
+    high = np.max([box[1] for box in boxes], axis=0)
+    half = float((high - low).max()) / 2
+    middle = (low + high) / 2
+    if not scene.triangles:
+        middle = np.array(min(scene.spheres, key=lambda sphere: sphere.radius).center, dtype=np.float64)
+    return middle, math.ldexp(1.0, min(MAX_SCALE_EXPONENT, -math.frexp(half)[1])) if half > 0.0 else 1.0
+
+
+MAX_SCALE_EXPONENT = 60
+"""Scenes smaller than 2^-60 m are not made larger: a camera 1e15 m away must stay within float32."""
+
+
+def _used_materials(scene: Scene) -> list[Material]:
+    """Materials that a triangle or sphere has, each once, in order of first use."""
+    used = dict.fromkeys(mesh.material for mesh in scene.meshes if len(mesh.faces))
+    used.update(dict.fromkeys(sphere.material for sphere in scene.spheres))
+    return list(used)
+
+
+def _material_table(materials: list[Material], textures: list[Texture], plan: EffectPlan) -> NDArray[np.void]:
+    table = np.zeros(len(materials), dtype=MATERIAL)
+    for row, material in enumerate(materials):
+        for name in ("diffuse", "specular", "emission", "reflection", "transmission"):
+            for channel, value in zip(("red", "green", "blue"), getattr(material, name), strict=True):
+                table[row][f"{name}_{channel}"] = value
+        table[row]["shininess"] = material.shininess
+        table[row]["ior"] = material.ior
+        table[row]["picture"] = textures.index(material.diffuse_texture) if material.diffuse_texture else -1
+        table[row]["calls"] = (
+            (SPECULAR if "specular" in plan.names and any(material.specular) else 0)
+            | (MIRROR if any(material.reflection) else 0)
+            | (BOUNDARY if any(material.transmission) else 0)
+            | (LIT if any(material.diffuse) or any(material.specular) else 0)
+        )
+    return table
+
+
+def _light_table(scene: Scene, plan: EffectPlan, center: NDArray[np.float64], scale: float) -> NDArray[np.void]:
+    """Lights in scene units: intensity over squared distance stays the same when both are scaled."""
+    lit = [light for light in scene.lights if any(light.intensity)]
+    table = np.zeros(len(lit), dtype=LIGHT)
+    for row, light in enumerate(lit):
+        x, y, z = (np.array(light.position) - center) * scale
+        red, green, blue = np.array(light.intensity) * (scale * scale)
+        table[row] = (x, y, z, red, green, blue, light.casts_shadows and "shadows" in plan.names)
+    return table
+
+
+_Triangles = tuple[NDArray[np.float32], NDArray[np.int32], NDArray[np.float32], NDArray[np.bool_]]
+
+
+def _triangles(scene: Scene, row: dict[Material, int], center: NDArray[np.float64], scale: float) -> _Triangles:
+    """Vertices, faces, facets and shadow flags of all meshes together."""
+    meshes = [mesh for mesh in scene.meshes if len(mesh.faces)]
+    vertices = [np.zeros((0, 3), dtype=np.float32)]
+    faces = [np.zeros((0, 3), dtype=np.int64)]
+    facets = aligned_facets(sum(len(mesh.faces) for mesh in meshes))
+    casts = np.zeros(len(facets), dtype=np.bool_)
+    first_vertex = first_face = 0
+    for mesh in meshes:
+        local = ((mesh.vertices - center) * scale).astype(np.float32)
+        part = slice(first_face, first_face + len(mesh.faces))
+        _fill_facets(mesh, local, row[mesh.material], facets[part])
+        vertices.append(local)
+        faces.append(mesh.faces + first_vertex)
+        casts[part] = mesh.casts_shadows
+        first_vertex += len(local)
+        first_face = part.stop
+    if first_vertex > np.iinfo(np.int32).max:
+        raise SceneError(f"{scene.title or 'scene'}: expected fewer than 2^31 vertices, found {first_vertex}")
+    keep = _distinct(facets)
+    if len(keep) < len(facets):
+        kept = aligned_facets(len(keep))
+        kept[:] = facets[keep]
+        facets = kept
+    return np.concatenate(vertices), np.concatenate(faces).astype(np.int32)[keep], facets, casts[keep]
+
+
+def aligned_facets(count: int) -> NDArray[np.float32]:
+    """(count, FACET) float32 zeros whose rows begin on cache-line pairs."""
+    row_bytes = 4 * FACET
+    raw = np.zeros(count * row_bytes + row_bytes, dtype=np.uint8)
+    start = -raw.ctypes.data % row_bytes
+    return raw[start : start + count * row_bytes].view(np.float32).reshape(count, FACET)
+
+
+def _fill_facets(mesh: Mesh, local: NDArray[np.float32], material: int, facets: NDArray[np.float32]) -> None:
+    """Write the triangles of a mesh whose vertices in scene units are `local`, (n, 3) float32."""
+    corners = np.zeros((len(mesh.faces), 3, 8), dtype=np.float32)
+    corners[:, :, :3] = local[mesh.faces]
+    edge = corners[:, 1:, :3].astype(np.float64) - corners[:, :1, :3]
+    own = _unit(np.cross(edge[:, 0], edge[:, 1]))[:, None, :]
+    if mesh.normals is None:
+        corners[:, :, 3:6] = own
+    else:
+        given = _unit(np.asarray(mesh.normals, dtype=np.float64))[mesh.faces]
+        corners[:, :, 3:6] = np.where((given == 0.0).all(axis=2, keepdims=True), own, given)
+    if mesh.uvs is not None:
+        with np.errstate(over="ignore"):
+            corners[:, :, 6:8] = mesh.uvs[mesh.faces]
+    facets[:, :MATERIAL_COLUMN] = corners.reshape(-1, MATERIAL_COLUMN)
+    facets[:, MATERIAL_COLUMN] = material
+    facets[:, SMOOTH_COLUMN] = np.abs(corners[:, :, 3:6] - own).max(axis=(1, 2)) > FLAT_NORMAL
+
+
+FLAT_NORMAL = 1e-6
+"""Largest difference of a corner normal from the triangle's own that is rounding only."""
+
+
+def _unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Vectors of unit length; 0 for those that are 0 or not finite. Safe for any length."""
+    finite = np.where(np.isfinite(vectors).all(axis=-1, keepdims=True), vectors, 0.0)
+    largest = np.abs(finite).max(axis=-1, keepdims=True)
+    reduced = finite / np.where(largest > 0.0, largest, 1.0)
+    length = np.linalg.norm(reduced, axis=-1, keepdims=True)
+    return np.asarray(reduced / np.where(length > 0.0, length, 1.0))
+
+
+def _distinct(facets: NDArray[np.float32]) -> NDArray[np.int64]:
+    """Rows of triangles to keep: with an area, and the first of those at the same place."""
+    positions = facets[:, :MATERIAL_COLUMN].reshape(-1, 3, 8)[:, :, :3]
+    wide = positions.astype(np.float64)
+    area = np.cross(wide[:, 1] - wide[:, 0], wide[:, 2] - wide[:, 0])
+    solid = np.flatnonzero((area != 0.0).any(axis=1))
+    flat = positions[solid].reshape(len(solid), 9) + np.float32(0.0)
+    mixed = np.sort(_mixed_bits(flat))
+    if not (mixed[1:] == mixed[:-1]).any():
+        return solid
+    _, first = np.unique(flat, axis=0, return_index=True)
+    return np.asarray(solid[np.sort(first)])
+
+
+def _mixed_bits(flat: NDArray[np.float32]) -> NDArray[np.uint64]:
+    """A 64-bit hash of each row of (n, 9) float32 numbers."""
+    words = flat.view(np.uint32)
+    mixed = np.zeros(len(words), dtype=np.uint64)
+    for column in range(9):
+        mixed = (mixed ^ words[:, column]) * np.uint64(0x9E3779B97F4A7C15)
+        mixed ^= mixed >> np.uint64(29)
+    return mixed

@@ -1,0 +1,90 @@
+"""The records that flow between the stages of the tracer: rays, hits and shadow rays."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class Rays(NamedTuple):
+    """Rays on their way, in scene units.
+
+    Attributes:
+        origin, direction: (n, 3) float32; directions are of unit length.
+        weight: (n, 3) float32 share of what the ray sees that reaches the eye.
+        sample: (n,) int32 camera sample of the block it belongs to; rising along the array.
+    """
+
+    origin: NDArray[np.float32]
+    direction: NDArray[np.float32]
+    weight: NDArray[np.float32]
+    sample: NDArray[np.int32]
+
+
+class ShadowRays(NamedTuple):
+    """Rays towards a light, with what arrives if nothing is in between.
+
+    Attributes:
+        origin, direction: (n, 3) float32; directions are of unit length.
+        reach: (n,) float32 distance of the light.
+        light: (n, 3) float32 radiance that the sample gains if the light is seen.
+        sample: (n,) int32 camera sample of the block.
+    """
+
+    origin: NDArray[np.float32]
+    direction: NDArray[np.float32]
+    reach: NDArray[np.float32]
+    light: NDArray[np.float32]
+    sample: NDArray[np.int32]
+
+
+class Hits(NamedTuple):
+    """Nearest hits of rays.
+
+    Attributes:
+        primitive: (n,) int32: a triangle, a sphere (numbered after the triangles) or -1 for nothing.
+        distance: (n,) float32 in lengths of the direction; meaningless for a miss.
+        u, v: (n,) float32 barycentric weights of a triangle's second and third corner.
+    """
+
+    primitive: NDArray[np.int32]
+    distance: NDArray[np.float32]
+    u: NDArray[np.float32]
+    v: NDArray[np.float32]
+
+
+def some_rays(rays: Rays, start: int, stop: int) -> Rays:
+    """Rays start .. stop - 1, without a copy."""
+    return Rays(
+        rays.origin[start:stop], rays.direction[start:stop], rays.weight[start:stop], rays.sample[start:stop]
+    )
+
+
+def first_shadow_rays(rays: ShadowRays, count: int) -> ShadowRays:
+    """The first `count` shadow rays, without a copy."""
+    return ShadowRays(
+        rays.origin[:count], rays.direction[:count], rays.reach[:count], rays.light[:count], rays.sample[:count]
+    )
+
+
+def make_rays(capacity: int) -> Rays:
+    """Room for `capacity` rays."""
+    return Rays(
+        origin=np.zeros((capacity, 3), dtype=np.float32),
+        direction=np.zeros((capacity, 3), dtype=np.float32),
+        weight=np.zeros((capacity, 3), dtype=np.float32),
+        sample=np.zeros(capacity, dtype=np.int32),
+    )
+
+
+def make_shadow_rays(capacity: int) -> ShadowRays:
+    """Room for `capacity` shadow rays."""
+    return ShadowRays(
+        origin=np.zeros((capacity, 3), dtype=np.float32),
+        direction=np.zeros((capacity, 3), dtype=np.float32),
+        reach=np.zeros(capacity, dtype=np.float32),
+        light=np.zeros((capacity, 3), dtype=np.float32),
+        sample=np.zeros(capacity, dtype=np.int32),
+    )

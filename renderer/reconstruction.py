@@ -1,0 +1,118 @@
+"""From cells to pixels: each pixel takes its cell's mean, exposed and tone-mapped once a cell."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.cellmap import CellMap
+from renderer.kernel import kernel
+from renderer.store import Samples
+from renderer.tonemap import FIRST_CODES, THRESHOLDS, srgb_code
+from renderer.workers import WorkerPool
+
+STRIP_ROWS = 64
+"""Rows gathered together [px]."""
+
+STRIP_CELLS = 32_768
+"""Cells averaged together."""
+
+
+def reconstruct(
+    cell_map: CellMap, slots: NDArray[np.int64], samples: Samples, exposure: float, linear: bool, pool: WorkerPool
+) -> NDArray[np.uint8] | NDArray[np.float32]:
+    """The frame, each pixel the mean of its cell's samples (the paper's reconstruction, `nearest`).
+
+    Args:
+        cell_map: the cells.
+        slots: (n,) int64 slot of each cell in `samples`.
+        samples: sums and counts, every cell with at least one sample.
+        exposure: factor from radiance to 0..1; not applied to a linear frame.
+        linear: float32 radiance in place of 8-bit sRGB.
+        pool: threads.
+
+    Returns:
+        (h, w, 3) uint8 sRGB, or float32 linear radiance.
+    """
+    height, width = cell_map.mask.shape
+    strips = -(-height // STRIP_ROWS)
+    chunks = -(-cell_map.cells // STRIP_CELLS)
+    if linear:
+        means = np.zeros((cell_map.cells, 3), dtype=np.float32)
+        radiance = np.zeros((height, width, 3), dtype=np.float32)
+
+        def average(chunk: int) -> None:
+            part = slice(chunk * STRIP_CELLS, (chunk + 1) * STRIP_CELLS)
+            _mean_radiance(samples, slots[part], means[part])
+
+        def spread(strip: int) -> None:
+            part = slice(strip * STRIP_ROWS, (strip + 1) * STRIP_ROWS)
+            _gather_radiance(cell_map.mask[part], means, radiance[part])
+
+        pool.run(average, chunks)
+        pool.run(spread, strips)
+        return radiance
+    codes = np.zeros(cell_map.cells, dtype=np.uint32)
+    picture = np.zeros((height, width, 3), dtype=np.uint8)
+
+    def expose(chunk: int) -> None:
+        part = slice(chunk * STRIP_CELLS, (chunk + 1) * STRIP_CELLS)
+        _mean_codes(samples, slots[part], np.float32(exposure), THRESHOLDS, FIRST_CODES, codes[part])
+
+    def paint(strip: int) -> None:
+        part = slice(strip * STRIP_ROWS, (strip + 1) * STRIP_ROWS)
+        _gather_codes(cell_map.mask[part], codes, picture[part])
+
+    pool.run(expose, chunks)
+    pool.run(paint, strips)
+    return picture
+
+
+@kernel
+def _mean_radiance(samples: Samples, slots: NDArray[np.int64], means: NDArray[np.float32]) -> None:
+    total, count = samples.total, samples.number
+    for cell in range(len(slots)):
+        slot = slots[cell]
+        share = np.float32(1.0) / np.float32(count[slot])
+        for channel in range(3):
+            means[cell, channel] = total[slot, channel] * share
+
+
+@kernel
+def _mean_codes(
+    samples: Samples,
+    slots: NDArray[np.int64],
+    exposure: np.float32,
+    thresholds: NDArray[np.float32],
+    first_codes: NDArray[np.uint8],
+    codes: NDArray[np.uint32],
+) -> None:
+    """Exposed mean of each cell as red | green << 8 | blue << 16."""
+    total, count = samples.total, samples.number
+    for cell in range(len(slots)):
+        slot = slots[cell]
+        share = exposure * (np.float32(1.0) / np.float32(count[slot]))
+        red = srgb_code(total[slot, 0] * share, thresholds, first_codes)
+        green = srgb_code(total[slot, 1] * share, thresholds, first_codes)
+        blue = srgb_code(total[slot, 2] * share, thresholds, first_codes)
+        codes[cell] = red | (green << 8) | (blue << 16)
+
+
+@kernel
+def _gather_radiance(
+    mask: NDArray[np.int32], means: NDArray[np.float32], radiance: NDArray[np.float32]
+) -> None:
+    for row in range(mask.shape[0]):
+        for column in range(mask.shape[1]):
+            for channel in range(3):
+                radiance[row, column, channel] = means[mask[row, column], channel]
+
+
+@kernel
+def _gather_codes(mask: NDArray[np.int32], codes: NDArray[np.uint32], picture: NDArray[np.uint8]) -> None:
+    for row in range(mask.shape[0]):
+        for column in range(mask.shape[1]):
+            code = codes[mask[row, column]]
+            picture[row, column, 0] = code & 0xFF
+            picture[row, column, 1] = (code >> 8) & 0xFF
+            picture[row, column, 2] = code >> 16

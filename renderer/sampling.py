@@ -1,0 +1,132 @@
+"""Where in its cell each camera ray goes.
+
+The first sample is the cell's centre. The others are uniform over the cell (`stochastic`), hashed from
+the cell's position and side and the sample's number, or lie on a lattice (`regular`). Neither knows the
+frame or the gaze, so the same cell always gets the same rays.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.camera import ViewFrame
+from renderer.kernel import formula, kernel
+from renderer.rays import Rays
+
+GOLDEN = np.uint64(0x9E3779B97F4A7C15)
+MIX_1 = np.uint64(0xBF58476D1CE4E5B9)
+MIX_2 = np.uint64(0x94D049BB133111EB)
+"""Constants of the splitmix64 generator (Steele, Lea and Flood 2014)."""
+
+TO_UNIT = 2.0**-32
+"""From a 32-bit integer to [0, 1)."""
+
+
+@formula
+def mix(word: np.uint64) -> np.uint64:
+    """Finaliser of splitmix64: 64 well mixed bits of `word`."""
+    word = (word ^ (word >> np.uint64(30))) * MIX_1
+    word = (word ^ (word >> np.uint64(27))) * MIX_2
+    return word ^ (word >> np.uint64(31))
+
+
+@formula
+def cell_seed(x: int, y: int, side: int) -> np.uint64:
+    """Seed of a cell: its position and side, each below 2^16, side by side."""
+    return mix((np.uint64(x) | (np.uint64(y) << np.uint64(20)) | (np.uint64(side) << np.uint64(40))) + GOLDEN)
+
+
+@functools.cache
+def lattice_step(samples: int) -> int:
+    """Generator a of the rank-1 lattice (i/n, i*a/n) of n points that keeps them farthest apart.
+
+    Args:
+        samples: n, 1 or more.
+    """
+    index = np.arange(1, samples)
+    if len(index) == 0:
+        return 1
+    candidates = np.arange(1, samples) if samples <= 512 else np.unique(np.linspace(1, samples - 1, 512).astype(int))
+    best, widest = 1, -1.0
+    across = np.minimum(index, samples - index)
+    for step in candidates:
+        down = index * step % samples
+        down = np.minimum(down, samples - down)
+        nearest = float((across * across + down * down).min())
+        if nearest > widest:
+            best, widest = int(step), nearest
+    return best
+
+
+@formula
+def lattice_shift(step: int, points: int) -> float:
+    """Shift, in steps of 1/points, that puts the lattice's coordinates i*step/points in the middle of
+    their strata when counted from the cell's centre: half a stratum where there is an even number of
+    them, else nothing. Without it the samples would lean to the cell's upper left.
+    """
+    shared = math.gcd(step, points)
+    return 0.5 * shared if points // shared % 2 == 0 else 0.0
+
+
+@kernel
+def camera_rays(
+    view: ViewFrame,
+    origin: NDArray[np.float32],
+    width: int,
+    height: int,
+    x: NDArray[np.int32],
+    y: NDArray[np.int32],
+    side: NDArray[np.int32],
+    cells: NDArray[np.int32],
+    first_sample: int,
+    samples: int,
+    step: int,
+    rays: Rays,
+) -> None:
+    """Write the camera rays of some cells, all samples of a cell after one another.
+
+    Args:
+        view: the camera on the display.
+        origin: (3,) float32 camera position in scene units.
+        width, height: the screen [px].
+        x, y, side: (n,) int32 cell vector.
+        cells: (c,) int32 cells to sample.
+        first_sample, samples: samples first_sample .. first_sample + samples - 1 of each cell.
+        step: 0 for stochastic samples, else the generator of the regular lattice of
+            first_sample + samples points.
+        rays: room for c * samples rays.
+    """
+    corner, step_x, step_y = view.corner, view.step_x, view.step_y
+    origins, directions, weights, sample_of = rays.origin, rays.direction, rays.weight, rays.sample
+    points = first_sample + samples
+    shift_u, shift_v = lattice_shift(1, points), lattice_shift(step, points)
+    ray = 0
+    for index in range(len(cells)):
+        cell = cells[index]
+        left, top = x[cell], y[cell]
+        wide, high = min(side[cell], width - left), min(side[cell], height - top)
+        seed = cell_seed(left, top, side[cell])
+        for sample in range(first_sample, first_sample + samples):
+            u, v = 0.5, 0.5
+            if sample > 0 and step > 0:
+                u = (0.5 + (sample + shift_u) / points) % 1.0
+                v = (0.5 + (sample * step + shift_v) / points) % 1.0
+            elif sample > 0:
+                word = mix(seed + np.uint64(sample) * GOLDEN)
+                u = (np.float64(word >> np.uint64(32)) + 0.5) * TO_UNIT
+                v = (np.float64(word & np.uint64(0xFFFFFFFF)) + 0.5) * TO_UNIT
+            px, py = left + u * wide, top + v * high
+            dx = corner[0] + px * step_x[0] + py * step_y[0]
+            dy = corner[1] + px * step_x[1] + py * step_y[1]
+            dz = corner[2] + px * step_x[2] + py * step_y[2]
+            length = np.sqrt(dx * dx + dy * dy + dz * dz)
+            directions[ray, 0], directions[ray, 1], directions[ray, 2] = dx / length, dy / length, dz / length
+            for axis in range(3):
+                origins[ray, axis] = origin[axis]
+                weights[ray, axis] = 1.0
+            sample_of[ray] = ray
+            ray += 1

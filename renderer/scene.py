@@ -1,0 +1,263 @@
+"""The scene as its author states it: float64, metres, y up, linear Rec.709 light.
+
+Nothing here knows how the scene is traced; `prepared` turns it into what the kernels read.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.camera import Camera
+from renderer.errors import SceneError, SettingsError, require_number
+
+Rgb = tuple[float, float, float]
+
+BLACK: Rgb = (0.0, 0.0, 0.0)
+
+MAX_COORDINATE_M = 1e12
+"""Largest coordinate of a scene [m]: beyond, products of three lengths leave float32 (Embree)."""
+
+MAX_SHININESS = 1e9
+"""Largest Phong exponent."""
+
+MAX_RADIANCE = 1e12
+"""Largest radiance or intensity a scene may state; keeps every product finite in float32."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Texture:
+    """An image looked up by texture coordinates, repeating, bilinearly filtered.
+
+    Attributes:
+        pixels: (h, w, 3) uint8, sRGB-coded, row 0 at the top; v = 0 is the bottom edge.
+        name: for messages.
+
+    Raises:
+        SceneError: for another shape or dtype, or no pixels.
+    """
+
+    pixels: NDArray[np.uint8]
+    name: str = "texture"
+
+    def __post_init__(self) -> None:
+        if self.pixels.dtype != np.uint8 or self.pixels.ndim != 3 or self.pixels.shape[2] != 3 or self.pixels.size == 0:
+            raise SceneError(
+                f"{self.name}: expected (height, width, 3) uint8 pixels, "
+                f"found {self.pixels.shape} {self.pixels.dtype}"
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class Material:
+    """What a surface does with light (Phong; Whitted 1980).
+
+    Under a point light of intensity I at distance r a surface of this material sends
+    (diffuse/pi * N.L + specular * (R.V)^shininess) * I / r^2 to the eye.
+
+    Attributes:
+        name: for messages.
+        diffuse: diffuse albedo, 0 to 1 each; multiplied by `diffuse_texture` where there is one.
+        specular: Phong highlight, 0 or more each.
+        shininess: Phong exponent, 0 to 1e9.
+        emission: radiance sent out by itself [W/(sr m^2)], seen by rays but lighting nothing.
+        reflection: mirror share, 0 to 1 each.
+        transmission: share let through, 0 to 1 each; above 0 the surface is a dielectric boundary
+            whose mirrored share is Fresnel's F and whose transmitted share is (1 - F) * transmission.
+        ior: index of refraction inside the surface relative to outside, 0.1 to 10; 1 goes straight through.
+        diffuse_texture: multiplies `diffuse`; None for none.
+
+    Raises:
+        SettingsError: naming the field, for a value out of range.
+    """
+
+    name: str = "material"
+    diffuse: Rgb = (0.8, 0.8, 0.8)
+    specular: Rgb = BLACK
+    shininess: float = 32.0
+    emission: Rgb = BLACK
+    reflection: Rgb = BLACK
+    transmission: Rgb = BLACK
+    ior: float = 1.5
+    diffuse_texture: Texture | None = None
+
+    def __post_init__(self) -> None:
+        where = f"material {self.name!r}"
+        for label, value, high in (
+            ("diffuse", self.diffuse, 1.0),
+            ("specular", self.specular, MAX_RADIANCE),
+            ("emission", self.emission, MAX_RADIANCE),
+            ("reflection", self.reflection, 1.0),
+            ("transmission", self.transmission, 1.0),
+        ):
+            require_rgb(f"{where}.{label}", value, high)
+        require_number(f"{where}.shininess", self.shininess, 0.0, MAX_SHININESS)
+        require_number(f"{where}.ior", self.ior, 0.1, 10.0)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Mesh:
+    """Triangles of one material.
+
+    Attributes:
+        vertices: (n, 3) float64 positions [m].
+        faces: (m, 3) int64 vertex indices, counter-clockwise seen from outside.
+        material: of every face.
+        normals: (n, 3) float64 vertex normals for smooth shading, of any length (zero: use the
+            face's own); None for flat faces.
+        uvs: (n, 2) float64 texture coordinates; None for none.
+        casts_shadows: whether it stands between a light and what the light falls on.
+        name: for messages.
+
+    Raises:
+        SceneError: naming the mesh, for wrong shapes, indices out of range or vertices that are not finite.
+    """
+
+    vertices: NDArray[np.float64]
+    faces: NDArray[np.int64]
+    material: Material
+    normals: NDArray[np.float64] | None = None
+    uvs: NDArray[np.float64] | None = None
+    casts_shadows: bool = True
+    name: str = "mesh"
+
+    def __post_init__(self) -> None:
+        n = len(self.vertices)
+        _require_shape(self.name, "vertices", self.vertices, (n, 3))
+        _require_shape(self.name, "faces", self.faces, (len(self.faces), 3))
+        if self.faces.dtype.kind not in "iu":
+            raise SceneError(f"{self.name}: faces: expected integers, found {self.faces.dtype}")
+        if len(self.faces) and (self.faces.min() < 0 or self.faces.max() >= n):
+            bad = int(np.argmax((self.faces < 0).any(axis=1) | (self.faces >= n).any(axis=1)))
+            raise SceneError(
+                f"{self.name}: face {bad}: expected vertex indices from 0 to {n - 1}, "
+                f"found {self.faces[bad].tolist()}"
+            )
+        _require_bounded(self.name, "vertex", self.vertices)
+        if self.normals is not None:
+            _require_shape(self.name, "normals", self.normals, (n, 3))
+        if self.uvs is not None:
+            _require_shape(self.name, "uvs", self.uvs, (n, 2))
+
+
+@dataclass(frozen=True, slots=True)
+class Sphere:
+    """A sphere traced by its equation, not tessellated.
+
+    Attributes:
+        center: position [m].
+        radius: [m], above 0.
+        material: of its surface; textures map longitude to u and latitude to v.
+        casts_shadows: whether it stands between a light and what the light falls on.
+
+    Raises:
+        SettingsError: for a centre that is not finite or a radius that is not positive.
+    """
+
+    center: tuple[float, float, float]
+    radius: float
+    material: Material
+    casts_shadows: bool = True
+
+    def __post_init__(self) -> None:
+        for axis, value in zip("xyz", self.center, strict=True):
+            require_number(f"sphere.center.{axis}", value, -MAX_COORDINATE_M, MAX_COORDINATE_M)
+        require_number("sphere.radius", self.radius, 0.0, MAX_COORDINATE_M, open_low=True)
+
+
+@dataclass(frozen=True, slots=True)
+class PointLight:
+    """A light without size, falling off with the square of the distance.
+
+    Attributes:
+        position: [m].
+        intensity: [W/sr], 0 or more each.
+        casts_shadows: False lights through everything.
+    """
+
+    position: tuple[float, float, float]
+    intensity: Rgb
+    casts_shadows: bool = True
+
+    def __post_init__(self) -> None:
+        for axis, value in zip("xyz", self.position, strict=True):
+            require_number(f"light.position.{axis}", value, -MAX_COORDINATE_M, MAX_COORDINATE_M)
+        require_rgb("light.intensity", self.intensity, 1e24)
+
+
+@dataclass(frozen=True, slots=True)
+class Surroundings:
+    """What rays that leave the scene see, and the light that comes from everywhere.
+
+    Attributes:
+        zenith: radiance straight up.
+        horizon: radiance at and below the horizon; in between it blends with the height of the ray.
+        ambient: radiance that lights every surface evenly: a surface sends out diffuse * ambient.
+    """
+
+    zenith: Rgb = BLACK
+    horizon: Rgb = BLACK
+    ambient: Rgb = BLACK
+
+    def __post_init__(self) -> None:
+        require_rgb("surroundings.zenith", self.zenith, MAX_RADIANCE)
+        require_rgb("surroundings.horizon", self.horizon, MAX_RADIANCE)
+        require_rgb("surroundings.ambient", self.ambient, MAX_RADIANCE)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Scene:
+    """Everything a frame shows, and the view its author chose.
+
+    Attributes:
+        meshes, spheres, lights: the content; all may be empty.
+        surroundings: light from outside.
+        camera: the default view.
+        exposure: factor from radiance to display-linear 0..1.
+        title: one line for people.
+    """
+
+    meshes: tuple[Mesh, ...] = ()
+    spheres: tuple[Sphere, ...] = ()
+    lights: tuple[PointLight, ...] = ()
+    surroundings: Surroundings = field(default_factory=Surroundings)
+    camera: Camera = field(default_factory=Camera)
+    exposure: float = 1.0
+    title: str = ""
+
+    def __post_init__(self) -> None:
+        require_number("scene.exposure", self.exposure, 0.0, MAX_RADIANCE, open_low=True)
+
+    @property
+    def triangles(self) -> int:
+        """Number of triangles in all meshes."""
+        return sum(len(mesh.faces) for mesh in self.meshes)
+
+
+def require_rgb(field_name: str, value: Rgb, high: float) -> None:
+    """Check that `value` is three numbers from 0 to `high`.
+
+    Raises:
+        SettingsError: naming the field and the channel.
+    """
+    if len(value) != 3:
+        raise SettingsError(field_name, "three numbers: red, green, blue", value)
+    for channel, part in zip(("red", "green", "blue"), value, strict=True):
+        require_number(f"{field_name}.{channel}", part, 0.0, high)
+
+
+def _require_shape(name: str, label: str, array: NDArray[np.generic], shape: tuple[int, ...]) -> None:
+    if array.shape != shape:
+        raise SceneError(f"{name}: {label}: expected shape {shape}, found {array.shape}")
+
+
+def _require_bounded(name: str, label: str, points: NDArray[np.float64]) -> None:
+    good = (np.abs(points) <= MAX_COORDINATE_M).all(axis=1)
+    if not good.all():
+        bad = int(np.argmin(good))
+        raise SceneError(
+            f"{name}: {label} {bad}: expected finite coordinates up to {MAX_COORDINATE_M:g} m, "
+            f"found {points[bad].tolist()}"
+        )

@@ -1,0 +1,275 @@
+"""What a surface sends back along a ray: Phong's local light, and the rays it spawns (Whitted 1980)."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.fresnel import fresnel, refracted_cosine
+from renderer.kernel import formula, kernel, prefetch
+from renderer.prepared import BOUNDARY, LIT, MIRROR, SPECULAR, Surfaces
+from renderer.rays import Hits, Rays, ShadowRays
+from renderer.surface import OFFSET_ULPS, Surface, sphere_surface, triangle_surface
+from renderer.texture import look_up
+
+INVERSE_PI = 1.0 / math.pi
+
+AHEAD = 12
+"""How many rays ahead a triangle is fetched from memory: its latency over the time of one ray."""
+
+CHILDREN = 0
+SHADOWS = 1
+REFLECTIONS = 2
+REFRACTIONS = 3
+COUNTERS = 4
+"""Slots of the counters that `shade` fills: rays spawned, shadow rays, and the former by kind."""
+
+
+@formula
+def phong_lobe(
+    s: Surface, lx: float, ly: float, lz: float, vx: float, vy: float, vz: float, shininess: float
+) -> float:
+    """(R.V)^shininess, R the mirror image of the direction to the light; 0 where R faces away from V.
+
+    Args:
+        s: the surface.
+        lx, ly, lz: unit direction to the light.
+        vx, vy, vz: unit direction to the eye.
+        shininess: exponent, 0 to 1e9.
+    """
+    twice = 2.0 * (s.nx * lx + s.ny * ly + s.nz * lz)
+    cosine = (twice * s.nx - lx) * vx + (twice * s.ny - ly) * vy + (twice * s.nz - lz) * vz
+    if not cosine > 0.0:
+        return 0.0
+    return float(min(1.0, cosine) ** shininess)
+
+
+@formula
+def _towards(
+    s: Surface, lx: float, ly: float, lz: float
+) -> tuple[float, float, float, float, float, float, float]:
+    """The shadow ray from a surface to a light at (lx, ly, lz): origin, unit direction, and how far to look,
+    which is 0 or less if nothing can be in between.
+    """
+    ox = s.px + s.lift_x + s.gx * s.offset
+    oy = s.py + s.lift_y + s.gy * s.offset
+    oz = s.pz + s.lift_z + s.gz * s.offset
+    dx, dy, dz = lx - ox, ly - oy, lz - oz
+    distance = math.sqrt(dx * dx + dy * dy + dz * dz)
+    reach = distance - OFFSET_ULPS * max(abs(lx), max(abs(ly), abs(lz)))
+    inverse = 1.0 / distance if distance > 0.0 else 0.0
+    return ox, oy, oz, dx * inverse, dy * inverse, dz * inverse, reach
+
+
+@formula
+def _light_to_eye(
+    s: Surface, material: Any, kr: float, kg: float, kb: float, light: Any,
+    vx: float, vy: float, vz: float,
+) -> tuple[float, float, float]:
+    """Radiance that a surface of diffuse albedo (kr, kg, kb) sends towards (vx, vy, vz) of one light,
+    nothing being in between; 0 for a light behind the surface or in it.
+    """
+    tx, ty, tz = light.x - s.px, light.y - s.py, light.z - s.pz
+    square = tx * tx + ty * ty + tz * tz
+    if not square > 0.0:
+        return 0.0, 0.0, 0.0
+    inverse = 1.0 / math.sqrt(square)
+    tx, ty, tz = tx * inverse, ty * inverse, tz * inverse
+    cosine = tx * s.nx + ty * s.ny + tz * s.nz
+    if cosine <= 0.0:
+        return 0.0, 0.0, 0.0
+    matt = cosine * INVERSE_PI
+    red, green, blue = kr * matt, kg * matt, kb * matt
+    if material.calls & SPECULAR != 0:
+        gloss = phong_lobe(s, tx, ty, tz, vx, vy, vz, material.shininess)
+        red += material.specular_red * gloss
+        green += material.specular_green * gloss
+        blue += material.specular_blue * gloss
+    falloff = inverse * inverse
+    return red * (light.red * falloff), green * (light.green * falloff), blue * (light.blue * falloff)
+
+
+@formula
+def _mirrored(s: Surface, dx: float, dy: float, dz: float) -> tuple[float, float, float]:
+    """Unit direction of the mirror ray; where a bent normal would send it into the surface, the face's own is used."""
+    d = 2.0 * (dx * s.nx + dy * s.ny + dz * s.nz)
+    rx, ry, rz = dx - d * s.nx, dy - d * s.ny, dz - d * s.nz
+    if rx * s.gx + ry * s.gy + rz * s.gz <= 0.0:
+        d = 2.0 * (dx * s.gx + dy * s.gy + dz * s.gz)
+        rx, ry, rz = dx - d * s.gx, dy - d * s.gy, dz - d * s.gz
+    inverse = 1.0 / math.sqrt(rx * rx + ry * ry + rz * rz)
+    return rx * inverse, ry * inverse, rz * inverse
+
+
+@formula
+def _bent(
+    s: Surface, eta: float, cosine: float, refracted: float, dx: float, dy: float, dz: float
+) -> tuple[float, float, float]:
+    """Unit direction of the refracted ray (Snell's law in vector form); eta = 1 goes straight on."""
+    if eta == 1.0:
+        return dx, dy, dz
+    bend = eta * cosine - refracted
+    rx, ry, rz = eta * dx + bend * s.nx, eta * dy + bend * s.ny, eta * dz + bend * s.nz
+    if rx * s.gx + ry * s.gy + rz * s.gz >= 0.0:
+        return dx, dy, dz
+    inverse = 1.0 / math.sqrt(rx * rx + ry * ry + rz * rz)
+    return rx * inverse, ry * inverse, rz * inverse
+
+
+@kernel
+def shade(
+    surfaces: Surfaces,
+    rays: Rays,
+    hits: Hits,
+    spawn: bool,
+    cutoff: float,
+    children: Rays,
+    shadows: ShadowRays,
+    radiance: NDArray[np.float32],
+    counters: NDArray[np.int64],
+) -> None:
+    """Add what rays see to their samples, and write the rays they call for, in the order of the rays.
+
+    Args:
+        surfaces: the scene.
+        rays, hits: n rays and what they met.
+        spawn: whether mirrors and boundaries may send further rays.
+        cutoff: smallest weight worth a ray.
+        children: room for 2n rays.
+        shadows: room for n * lights shadow rays.
+        radiance: (samples, 3) float32, added to.
+        counters: (COUNTERS,) int64, set.
+    """
+    # Arrays are taken out of their records once: doing it in the loop counts references for each ray.
+    facets = surfaces.facets
+    center, radius, sphere_material = surfaces.spheres.center, surfaces.spheres.radius, surfaces.spheres.material
+    materials, lights, around = surfaces.materials, surfaces.lights, surfaces.surroundings
+    texels, pictures, linear = surfaces.textures.texels, surfaces.textures.pictures, surfaces.textures.linear
+    origin, direction, weight, sample_of = rays.origin, rays.direction, rays.weight, rays.sample
+    primitive_of, hit_u, hit_v = hits.primitive, hits.u, hits.v
+    child_origin, child_direction = children.origin, children.direction
+    child_weight, child_sample = children.weight, children.sample
+    shadow_origin, shadow_direction, shadow_reach = shadows.origin, shadows.direction, shadows.reach
+    shadow_light, shadow_sample = shadows.light, shadows.sample
+    triangles = len(facets)
+    counters[:] = 0
+    n_children = 0
+    n_shadows = 0
+    for ray in range(len(primitive_of)):
+        if ray + AHEAD < len(primitive_of):
+            prefetch(facets, max(0, primitive_of[ray + AHEAD]))
+        sample = sample_of[ray]
+        wr, wg, wb = float(weight[ray, 0]), float(weight[ray, 1]), float(weight[ray, 2])
+        dx, dy, dz = float(direction[ray, 0]), float(direction[ray, 1]), float(direction[ray, 2])
+        inverse = 1.0 / math.sqrt(dx * dx + dy * dy + dz * dz)
+        dx, dy, dz = dx * inverse, dy * inverse, dz * inverse
+        primitive = primitive_of[ray]
+        if primitive < 0:
+            high = min(1.0, max(0.0, dy))
+            low = 1.0 - high
+            radiance[sample, 0] += wr * (high * around[0, 0] + low * around[1, 0])
+            radiance[sample, 1] += wg * (high * around[0, 1] + low * around[1, 1])
+            radiance[sample, 2] += wb * (high * around[0, 2] + low * around[1, 2])
+            continue
+        if primitive < triangles:
+            s = triangle_surface(facets, primitive, float(hit_u[ray]), float(hit_v[ray]), dx, dy, dz)
+        else:
+            k = primitive - triangles
+            s = sphere_surface(
+                center[k, 0], center[k, 1], center[k, 2], radius[k], int(np.int64(sphere_material[k])),
+                float(origin[ray, 0]), float(origin[ray, 1]), float(origin[ray, 2]),
+                float(direction[ray, 0]), float(direction[ray, 1]), float(direction[ray, 2]),
+            )  # fmt: skip
+        material = materials[s.material]
+        kr, kg, kb = float(material.diffuse_red), float(material.diffuse_green), float(material.diffuse_blue)
+        if material.picture >= 0:
+            picture = pictures[material.picture]
+            tr, tg, tb = look_up(texels, linear, picture.start, picture.width, picture.height, s.u, s.v)
+            kr, kg, kb = kr * tr, kg * tg, kb * tb
+        radiance[sample, 0] += wr * (material.emission_red + kr * around[2, 0])
+        radiance[sample, 1] += wg * (material.emission_green + kg * around[2, 1])
+        radiance[sample, 2] += wb * (material.emission_blue + kb * around[2, 2])
+        if material.calls & LIT != 0:
+            for index in range(len(lights)):
+                light = lights[index]
+                red, green, blue = _light_to_eye(s, material, kr, kg, kb, light, -dx, -dy, -dz)
+                red, green, blue = wr * red, wg * green, wb * blue
+                if not max(red, max(green, blue)) > 0.0:
+                    continue
+                ox, oy, oz, sx, sy, sz, reach = _towards(s, light.x, light.y, light.z)
+                if light.casts != 0 and reach > 0.0:
+                    shadow_origin[n_shadows, 0] = ox
+                    shadow_origin[n_shadows, 1] = oy
+                    shadow_origin[n_shadows, 2] = oz
+                    shadow_direction[n_shadows, 0] = sx
+                    shadow_direction[n_shadows, 1] = sy
+                    shadow_direction[n_shadows, 2] = sz
+                    shadow_reach[n_shadows] = reach
+                    shadow_light[n_shadows, 0] = red
+                    shadow_light[n_shadows, 1] = green
+                    shadow_light[n_shadows, 2] = blue
+                    shadow_sample[n_shadows] = sample
+                    n_shadows += 1
+                else:
+                    radiance[sample, 0] += red
+                    radiance[sample, 1] += green
+                    radiance[sample, 2] += blue
+        if not spawn or material.calls & (MIRROR | BOUNDARY) == 0:
+            continue
+        mr, mg, mb = float(material.reflection_red), float(material.reflection_green), float(material.reflection_blue)
+        if material.calls & BOUNDARY != 0:
+            eta = 1.0 / material.ior if s.entering else float(material.ior)
+            cosine = -(dx * s.nx + dy * s.ny + dz * s.nz)
+            refracted = refracted_cosine(cosine, eta)
+            share = fresnel(cosine, refracted, eta)
+            rest = 1.0 - share
+            tr = wr * rest * (1.0 - mr) * material.transmission_red
+            tg = wg * rest * (1.0 - mg) * material.transmission_green
+            tb = wb * rest * (1.0 - mb) * material.transmission_blue
+            mr, mg, mb = share + rest * mr, share + rest * mg, share + rest * mb
+            if max(tr, max(tg, tb)) >= cutoff:
+                child_origin[n_children, 0] = s.px - s.offset * s.gx
+                child_origin[n_children, 1] = s.py - s.offset * s.gy
+                child_origin[n_children, 2] = s.pz - s.offset * s.gz
+                rx, ry, rz = _bent(s, eta, cosine, refracted, dx, dy, dz)
+                child_direction[n_children, 0], child_direction[n_children, 1], child_direction[n_children, 2] = rx, ry, rz
+                child_weight[n_children, 0], child_weight[n_children, 1], child_weight[n_children, 2] = tr, tg, tb
+                child_sample[n_children] = sample
+                n_children += 1
+                counters[REFRACTIONS] += 1
+        mr, mg, mb = wr * mr, wg * mg, wb * mb
+        if max(mr, max(mg, mb)) >= cutoff:
+            child_origin[n_children, 0] = s.px + s.offset * s.gx
+            child_origin[n_children, 1] = s.py + s.offset * s.gy
+            child_origin[n_children, 2] = s.pz + s.offset * s.gz
+            rx, ry, rz = _mirrored(s, dx, dy, dz)
+            child_direction[n_children, 0], child_direction[n_children, 1], child_direction[n_children, 2] = rx, ry, rz
+            child_weight[n_children, 0], child_weight[n_children, 1], child_weight[n_children, 2] = mr, mg, mb
+            child_sample[n_children] = sample
+            n_children += 1
+            counters[REFLECTIONS] += 1
+    counters[CHILDREN] = n_children
+    counters[SHADOWS] = n_shadows
+
+
+@kernel
+def add_unblocked(
+    shadows: ShadowRays, blocked: NDArray[np.uint8], radiance: NDArray[np.float32]
+) -> None:
+    """Add the light of the shadow rays that reach it to their samples.
+
+    Args:
+        shadows: n shadow rays.
+        blocked: (n,) uint8, 1 where something is in between.
+        radiance: (samples, 3) float32.
+    """
+    light, sample_of = shadows.light, shadows.sample
+    for ray in range(len(blocked)):
+        if blocked[ray] == 0:
+            sample = sample_of[ray]
+            radiance[sample, 0] += light[ray, 0]
+            radiance[sample, 1] += light[ray, 1]
+            radiance[sample, 2] += light[ray, 2]

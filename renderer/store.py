@@ -1,0 +1,177 @@
+"""The sample store: what was traced for a cell, kept for later frames of the same view.
+
+An aligned cell is known by its side, column and row, whatever the gaze, so a frame after a move of the
+gaze finds most of its cells here. Sums are kept in the order of the samples: a cell that gets its samples
+in two frames ends with the same bits as one that got them in one.
+"""
+
+from __future__ import annotations
+
+import threading
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.cellmap import CellMap
+from renderer.kernel import kernel
+
+LUMINANCE = (0.2126, 0.7152, 0.0722)
+"""Weights of red, green and blue (Rec. 709)."""
+
+BRIGHTEST = np.float32(1e16)
+"""Radiance beyond which a sample is cut, so that 4096 of their squares fit in float32."""
+
+BYTES_A_SLOT = 3 * 4 + 4 + 4
+"""Size of one cell's record [byte]."""
+
+
+class Samples(NamedTuple):
+    """What is known of cells, one slot each.
+
+    Attributes:
+        total: (n, 3) float32 sum of the radiance of its samples.
+        square: (n,) float32 sum of the squared luminance of its samples.
+        number: (n,) int32 how many samples.
+    """
+
+    total: NDArray[np.float32]
+    square: NDArray[np.float32]
+    number: NDArray[np.int32]
+
+
+class SampleStore:
+    """Samples of one view, one render at a time: hold `lock` from `missing` to the last read."""
+
+    def __init__(self, slots: int) -> None:
+        """Room for `slots` cells; memory is taken from the system only where it is written."""
+        self.lock = threading.Lock()
+        self.samples = Samples(
+            total=np.zeros((slots, 3), dtype=np.float32),
+            square=np.zeros(slots, dtype=np.float32),
+            number=np.zeros(slots, dtype=np.int32),
+        )
+
+    @property
+    def nbytes(self) -> int:
+        """Size in memory when every slot is in use."""
+        return len(self.samples.number) * BYTES_A_SLOT
+
+
+def aligned_sides(width: int, height: int) -> NDArray[np.int32]:
+    """Sides an aligned square can have on a screen: 1, 2, 3, 4, 6, 8, 12, ... up to its shorter side; int32 [px]."""
+    sides = [1]
+    for power in range(1, 17):
+        sides += [2**power, 3 * 2 ** (power - 1)]
+    return np.array(sorted(side for side in sides if side <= min(width, height)), dtype=np.int32)
+
+
+def aligned_slots(width: int, height: int) -> int:
+    """Number of aligned squares of all sides on a screen, those cut by its edge included."""
+    return int(_level_starts(width, height)[-1])
+
+
+def slots_of(cell_map: CellMap) -> NDArray[np.int64]:
+    """(n,) int64 slot of each cell: by side, row and column for aligned and full maps, else its number."""
+    if cell_map.kind == "scanline":
+        return np.arange(cell_map.cells)
+    height, width = cell_map.mask.shape
+    slots = np.zeros(cell_map.cells, dtype=np.int64)
+    sides = aligned_sides(width, height)
+    level = np.zeros(int(sides[-1]) + 1, dtype=np.int32)
+    level[sides] = np.arange(len(sides))
+    _find_slots(cell_map.x, cell_map.y, cell_map.side, level, _level_starts(width, height), width, slots)
+    return slots
+
+
+def slots_needed(cell_map: CellMap) -> int:
+    """Number of slots of a store that can hold `cell_map`."""
+    if cell_map.kind == "scanline":
+        return cell_map.cells
+    height, width = cell_map.mask.shape
+    return aligned_slots(width, height)
+
+
+def _level_starts(width: int, height: int) -> NDArray[np.int64]:
+    sides = aligned_sides(width, height).astype(np.int64)
+    squares = -(-width // sides) * -(-height // sides)
+    return np.concatenate(([0], np.cumsum(squares)))
+
+
+@kernel
+def _find_slots(
+    x: NDArray[np.int32],
+    y: NDArray[np.int32],
+    side: NDArray[np.int32],
+    level: NDArray[np.int32],
+    starts: NDArray[np.int64],
+    width: int,
+    slots: NDArray[np.int64],
+) -> None:
+    for cell in range(len(slots)):
+        length = side[cell]
+        columns = -(-width // length)
+        slots[cell] = starts[level[length]] + (y[cell] // length) * columns + x[cell] // length
+
+
+@kernel
+def missing_cells(samples: Samples, slots: NDArray[np.int64], wanted: int, missing: NDArray[np.int32]) -> int:
+    """List the cells that have no samples yet; those that have, have `wanted`.
+
+    Args:
+        samples: the store.
+        slots: (n,) int64 slot of each cell.
+        wanted: samples a cell.
+        missing: (n,) int32, the first of them written.
+
+    Returns:
+        How many are missing.
+    """
+    count = samples.number
+    found = 0
+    for cell in range(len(slots)):
+        if count[slots[cell]] != wanted:
+            missing[found] = cell
+            found += 1
+    return found
+
+
+@kernel
+def add_samples(
+    samples: Samples, slots: NDArray[np.int64], cells: NDArray[np.int32], radiance: NDArray[np.float32], each: int
+) -> int:
+    """Add the radiance of new samples to their cells, in the order of the samples.
+
+    Args:
+        samples: the store.
+        slots: (n,) int64 slot of each cell of the map.
+        cells: (c,) int32 cells that were sampled.
+        radiance: (c * each, 3) float32, the samples of a cell after one another.
+        each: samples a cell.
+
+    Returns:
+        How many samples were not a number or negative, and count as black.
+    """
+    total, squares, count = samples.total, samples.square, samples.number
+    rejected = 0
+    row = 0
+    for index in range(len(cells)):
+        slot = slots[cells[index]]
+        red, green, blue = total[slot, 0], total[slot, 1], total[slot, 2]
+        square = squares[slot]
+        for _ in range(each):
+            r, g, b = radiance[row, 0], radiance[row, 1], radiance[row, 2]
+            row += 1
+            if not (r >= 0.0 and g >= 0.0 and b >= 0.0):
+                rejected += 1
+                continue
+            r, g, b = min(r, BRIGHTEST), min(g, BRIGHTEST), min(b, BRIGHTEST)
+            luminance = np.float32(LUMINANCE[0]) * r + np.float32(LUMINANCE[1]) * g + np.float32(LUMINANCE[2]) * b
+            red += r
+            green += g
+            blue += b
+            square += luminance * luminance
+        total[slot, 0], total[slot, 1], total[slot, 2] = red, green, blue
+        squares[slot] = square
+        count[slot] += each
+    return rejected

@@ -1,0 +1,140 @@
+"""The place a ray met: position, normals, texture coordinates and the offset that leaves it.
+
+Positions come from barycentric weights (or lie on the sphere), never from origin + t * direction, whose
+error grows with distance. The offset is a number of units in the last place of the largest coordinate
+around, so it holds at every scale (Ize 2013; Waechter and Binder 2019 discuss why).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.kernel import formula
+from renderer.prepared import MATERIAL_COLUMN, SMOOTH_COLUMN
+from renderer.sphere import hit_distance
+
+OFFSET_ULPS = 16.0 * 2.0**-23
+"""How far a ray starts off its surface, in largest coordinates: twice what leaves no self-hit of 128,000."""
+
+
+SPHERE_OFFSET = 16.0 * 2.0**-52
+"""The same for the float64 rounding of a sphere's own numbers: the ground may be a sphere as large as the Earth."""
+
+
+class Surface(NamedTuple):
+    """One hit, in scene units; the normals face the side the ray came from.
+
+    Attributes:
+        px, py, pz: position.
+        gx, gy, gz: geometric unit normal.
+        nx, ny, nz: shading unit normal; near the outline of a smooth mesh it may lean away from the ray.
+        u, v: texture coordinates.
+        offset: distance along the geometric normal at which a leaving ray starts.
+        lift_x, lift_y, lift_z: shift of the origin of shadow rays on smooth triangles, 0 elsewhere.
+        material: row of the material table.
+        entering: True where the ray comes from outside.
+    """
+
+    px: float
+    py: float
+    pz: float
+    gx: float
+    gy: float
+    gz: float
+    nx: float
+    ny: float
+    nz: float
+    u: float
+    v: float
+    offset: float
+    lift_x: float
+    lift_y: float
+    lift_z: float
+    material: int
+    entering: bool
+
+
+@formula
+def _farther(a: float, b: float, c: float, limit: float) -> float:
+    return max(limit, max(abs(a), max(abs(b), abs(c))))
+
+
+@formula
+def _lift(
+    px: float, py: float, pz: float, cx: float, cy: float, cz: float, nx: float, ny: float, nz: float
+) -> float:
+    """How far below the plane of a corner's normal the point lies, 0 if above (Hanika 2021, ch. 4)."""
+    return min(0.0, (px - cx) * nx + (py - cy) * ny + (pz - cz) * nz)
+
+
+@formula
+def triangle_surface(
+    f: NDArray[np.float32], t: int, b1: float, b2: float, dx: float, dy: float, dz: float
+) -> Surface:
+    """The surface of facet `t` of the facets `f` at barycentric weights b1, b2 of its second and third corner.
+
+    The shadow origin of a smooth triangle is lifted to the curved surface its normals suggest, which
+    removes the black triangles at the shadow terminator (Hanika, Ray Tracing Gems II, 2021, ch. 4).
+    """
+    b0 = 1.0 - b1 - b2
+    ax, ay, az = float(f[t, 0]), float(f[t, 1]), float(f[t, 2])
+    bx, by, bz = float(f[t, 8]), float(f[t, 9]), float(f[t, 10])
+    cx, cy, cz = float(f[t, 16]), float(f[t, 17]), float(f[t, 18])
+    px, py, pz = b0 * ax + b1 * bx + b2 * cx, b0 * ay + b1 * by + b2 * cy, b0 * az + b1 * bz + b2 * cz
+    ix, iy, iz, jx, jy, jz = bx - ax, by - ay, bz - az, cx - ax, cy - ay, cz - az
+    gx, gy, gz = iy * jz - iz * jy, iz * jx - ix * jz, ix * jy - iy * jx
+    entering = gx * dx + gy * dy + gz * dz <= 0.0
+    face = 1.0 if entering else -1.0
+    inverse = face / math.sqrt(gx * gx + gy * gy + gz * gz)
+    gx, gy, gz = gx * inverse, gy * inverse, gz * inverse
+    nx, ny, nz = gx, gy, gz
+    lift_x, lift_y, lift_z = 0.0, 0.0, 0.0
+    if f[t, SMOOTH_COLUMN] != 0.0:
+        n0x, n0y, n0z = face * float(f[t, 3]), face * float(f[t, 4]), face * float(f[t, 5])
+        n1x, n1y, n1z = face * float(f[t, 11]), face * float(f[t, 12]), face * float(f[t, 13])
+        n2x, n2y, n2z = face * float(f[t, 19]), face * float(f[t, 20]), face * float(f[t, 21])
+        sx, sy, sz = b0 * n0x + b1 * n1x + b2 * n2x, b0 * n0y + b1 * n1y + b2 * n2y, b0 * n0z + b1 * n1z + b2 * n2z
+        length = math.sqrt(sx * sx + sy * sy + sz * sz)
+        if length > 0.0:
+            inverse = 1.0 / length
+            nx, ny, nz = sx * inverse, sy * inverse, sz * inverse
+        d0 = b0 * _lift(px, py, pz, ax, ay, az, n0x, n0y, n0z)
+        d1 = b1 * _lift(px, py, pz, bx, by, bz, n1x, n1y, n1z)
+        d2 = b2 * _lift(px, py, pz, cx, cy, cz, n2x, n2y, n2z)
+        lift_x = -(d0 * n0x + d1 * n1x + d2 * n2x)
+        lift_y = -(d0 * n0y + d1 * n1y + d2 * n2y)
+        lift_z = -(d0 * n0z + d1 * n1z + d2 * n2z)
+    reach = _farther(ax, ay, az, _farther(bx, by, bz, _farther(cx, cy, cz, 0.0)))
+    u = b0 * f[t, 6] + b1 * f[t, 14] + b2 * f[t, 22]
+    v = b0 * f[t, 7] + b1 * f[t, 15] + b2 * f[t, 23]
+    material = int(f[t, MATERIAL_COLUMN])
+    return Surface(
+        px, py, pz, gx, gy, gz, nx, ny, nz, u, v, reach * OFFSET_ULPS, lift_x, lift_y, lift_z, material, entering
+    )
+
+
+@formula
+def sphere_surface(
+    cx: float, cy: float, cz: float, radius: float, material: int,
+    ox: float, oy: float, oz: float, dx: float, dy: float, dz: float,
+) -> Surface:  # fmt: skip
+    """The surface of a sphere where a ray meets it; u is longitude, v latitude, from 0 to 1 each.
+
+    The direction is the very one that hit: after rounding it anew a ray along the rim could miss.
+    """
+    t = hit_distance(ox, oy, oz, dx, dy, dz, cx, cy, cz, radius)
+    nx, ny, nz = ox + t * dx - cx, oy + t * dy - cy, oz + t * dz - cz
+    length = math.sqrt(nx * nx + ny * ny + nz * nz)
+    nx, ny, nz = nx / length, ny / length, nz / length
+    u = 0.5 + math.atan2(nx, nz) / (2.0 * math.pi)
+    v = 0.5 + math.asin(max(-1.0, min(1.0, ny))) / math.pi
+    px, py, pz = cx + radius * nx, cy + radius * ny, cz + radius * nz
+    entering = nx * dx + ny * dy + nz * dz <= 0.0
+    face = 1.0 if entering else -1.0
+    nx, ny, nz = nx * face, ny * face, nz * face
+    offset = _farther(px, py, pz, 0.0) * OFFSET_ULPS + _farther(cx, cy, cz, radius) * SPHERE_OFFSET
+    return Surface(px, py, pz, nx, ny, nz, nx, ny, nz, u, v, offset, 0.0, 0.0, 0.0, material, entering)

@@ -1,0 +1,57 @@
+"""Linear tone mapping: exposure, clip, sRGB transfer, 8 bit (IEC 61966-2-1)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.kernel import formula
+from renderer.texture import srgb_to_linear
+
+LOWEST_EXPONENT = -13
+"""2^-13 is below the first threshold, 0.5/255/12.92."""
+
+STEPS_PER_OCTAVE = 256
+"""Entries of the table for each power of two: fine enough that none holds two thresholds."""
+
+
+def _thresholds() -> NDArray[np.float32]:
+    """(256,) float32: linear value from which on the code is at least i; code 0 has 0."""
+    edges = srgb_to_linear((np.arange(256) - 0.5) / 255)
+    edges[0] = 0.0
+    return edges.astype(np.float32)
+
+
+def _first_codes() -> NDArray[np.uint8]:
+    """Code at the lower end of each table entry."""
+    octaves = -LOWEST_EXPONENT
+    value = 2.0**LOWEST_EXPONENT * 2.0 ** (np.arange(octaves * STEPS_PER_OCTAVE) // STEPS_PER_OCTAVE)
+    value *= 1 + (np.arange(octaves * STEPS_PER_OCTAVE) % STEPS_PER_OCTAVE) / STEPS_PER_OCTAVE
+    return (np.searchsorted(THRESHOLDS, value.astype(np.float32), side="right") - 1).astype(np.uint8)
+
+
+THRESHOLDS = _thresholds()
+FIRST_CODES = _first_codes()
+
+
+def encode_srgb(linear: NDArray[np.floating]) -> NDArray[np.uint8]:
+    """8-bit sRGB codes of linear light, any shape; clipped to [0, 1], NaN becomes 0."""
+    clipped = np.clip(np.nan_to_num(np.asarray(linear, dtype=np.float32), nan=0.0), 0.0, 1.0)
+    return (np.searchsorted(THRESHOLDS, clipped, side="right") - 1).astype(np.uint8)
+
+
+@formula
+def srgb_code(value: np.float32, thresholds: NDArray[np.float32], first_codes: NDArray[np.uint8]) -> int:
+    """8-bit sRGB code of one linear value: table entry by its exponent and leading bits, then the next threshold.
+
+    Args:
+        value: float32, any; NaN and negative values become 0.
+        thresholds, first_codes: THRESHOLDS and FIRST_CODES.
+    """
+    if not value >= thresholds[1]:
+        return 0
+    if value >= thresholds[255]:
+        return 255
+    entry = (np.float32(value).view(np.int32) >> 15) - ((LOWEST_EXPONENT + 127) << 8)
+    code = int(first_codes[entry])
+    return code + 1 if value >= thresholds[code + 1] else code

@@ -1,0 +1,29 @@
+"""A scene that passes through every kernel, to compile them before the first user's frame needs them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from renderer.camera import Camera
+from renderer.scene import Material, Mesh, PointLight, Scene, Sphere, Texture
+
+
+def every_effect() -> Scene:
+    """A textured smooth floor, a mirror and a glass ball, lit with shadows."""
+    checks = Texture(np.array([[[255] * 3, [90] * 3], [[90] * 3, [255] * 3]], dtype=np.uint8), "checks")
+    floor = Mesh(
+        vertices=np.array([[-9, 0, -9], [9, 0, -9], [9, 0, 9], [-9, 0, 9]], dtype=np.float64),
+        faces=np.array([[0, 2, 1], [0, 3, 2]]),
+        material=Material("floor", specular=(0.1, 0.1, 0.1), diffuse_texture=checks),
+        normals=np.array([[0.1, 1, 0], [0, 1, 0.1], [-0.1, 1, 0], [0, 1, -0.1]]),
+        uvs=np.array([[0, 0], [9, 0], [9, 9], [0, 9]], dtype=np.float64),
+    )
+    return Scene(
+        meshes=(floor,),
+        spheres=(
+            Sphere((-1.0, 1.0, 0.0), 1.0, Material("mirror", reflection=(0.8, 0.8, 0.8))),
+            Sphere((1.0, 1.0, 0.0), 1.0, Material("glass", diffuse=(0.0, 0.0, 0.0), transmission=(1.0, 1.0, 1.0))),
+        ),
+        lights=(PointLight((3.0, 8.0, 5.0), (400.0, 400.0, 400.0)),),
+        camera=Camera((0.0, 2.0, 7.0), (0.0, 1.0, 0.0)),
+    )

@@ -1,0 +1,198 @@
+"""Whitted's loop over a block of camera samples: hit, shade, look for the lights, follow the mirrors."""
+
+from __future__ import annotations
+
+import threading
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.camera import Camera, ViewFrame, view_frame
+from renderer.display import Display
+from renderer.frame import RayCounts
+from renderer.prepared import PreparedScene
+from renderer.quality import Quality
+from renderer.rays import Rays, first_shadow_rays, make_rays, make_shadow_rays, some_rays
+from renderer.sampling import camera_rays, lattice_step
+from renderer.shading import CHILDREN, COUNTERS, REFLECTIONS, REFRACTIONS, SHADOWS, add_unblocked, shade
+
+BLOCK_RAYS = 8192
+"""Rays traced together: what they carry stays in a core's second-level cache."""
+
+MAX_BLOCK_SHADOW_RAYS = 65_536
+"""Bound on the shadow rays of a block; a scene of many lights gets smaller blocks."""
+
+SMALLEST_STEP = 0.5 / 255 / 12.92
+"""Half the smallest step of an 8-bit sRGB code, in linear light: less cannot change a pixel."""
+
+
+class View(NamedTuple):
+    """A camera on a display in the units of a scene.
+
+    Attributes:
+        frame: ray directions.
+        origin: (3,) float32 camera position in scene units.
+        width, height: the screen [px].
+    """
+
+    frame: ViewFrame
+    origin: NDArray[np.float32]
+    width: int
+    height: int
+
+
+class Cells(NamedTuple):
+    """Cells to be sampled.
+
+    Attributes:
+        x, y, side: (n,) int32 cell vector of the whole map.
+        chosen: (c,) int32 cells to sample.
+    """
+
+    x: NDArray[np.int32]
+    y: NDArray[np.int32]
+    side: NDArray[np.int32]
+    chosen: NDArray[np.int32]
+
+
+class _Scratch:
+    """Room for the rays of a block, level by level; one per thread, kept between blocks."""
+
+    def __init__(self, capacity: int, shadow_rays: int) -> None:
+        self.capacity = capacity
+        self.shadow_rays = shadow_rays
+        self.levels = [make_rays(2 * capacity)]
+        self.shadows = make_shadow_rays(shadow_rays)
+        self.counters = np.zeros(COUNTERS, dtype=np.int64)
+
+    def level(self, depth: int) -> Rays:
+        while len(self.levels) <= depth:
+            self.levels.append(make_rays(2 * self.capacity))
+        return self.levels[depth]
+
+
+_local = threading.local()
+
+
+def view_of(prepared: PreparedScene, camera: Camera, display: Display) -> View:
+    """The view of `camera` on `display` in the units of `prepared`."""
+    position = (np.array(camera.position, dtype=np.float64) - prepared.center) * prepared.scale
+    return View(view_frame(camera, display), position.astype(np.float32), display.width_px, display.height_px)
+
+
+def block_rays(prepared: PreparedScene) -> int:
+    """Rays traced together in this scene."""
+    lights = len(prepared.surfaces.lights)
+    return max(64, min(BLOCK_RAYS, MAX_BLOCK_SHADOW_RAYS // max(1, lights)))
+
+
+def trace_cells(
+    prepared: PreparedScene, view: View, cells: Cells, quality: Quality, first_sample: int, samples: int
+) -> tuple[NDArray[np.float32], RayCounts]:
+    """Radiance of camera samples of some cells.
+
+    Args:
+        prepared: the scene.
+        view: the camera.
+        cells: which cells; their number times `samples` should not exceed `block_rays(prepared)` unless
+            it is a single cell.
+        quality: antialiasing and depth.
+        first_sample, samples: samples first_sample .. first_sample + samples - 1 of each.
+
+    Returns:
+        (cells * samples, 3) float32 radiance, the samples of a cell after one another, and the rays traced.
+    """
+    n = len(cells.chosen) * samples
+    block = block_rays(prepared)
+    scratch = _scratch(max(block, n), block * len(prepared.surfaces.lights))
+    step = lattice_step(first_sample + samples) if quality.antialiasing == "regular" else 0
+    camera_rays(
+        view.frame, view.origin, view.width, view.height, cells.x, cells.y, cells.side, cells.chosen,
+        first_sample, samples, step, scratch.level(0),
+    )  # fmt: skip
+    radiance = np.zeros((n, 3), dtype=np.float32)
+    counts = _follow(prepared, scratch, n, block, quality.max_depth, radiance)
+    return radiance, counts
+
+
+def _scratch(capacity: int, shadow_rays: int) -> _Scratch:
+    """This thread's scratch, with room for `capacity` rays a level and `shadow_rays`; it never shrinks."""
+    held: _Scratch | None = getattr(_local, "scratch", None)
+    if held is None:
+        held = _Scratch(capacity, shadow_rays)
+    elif held.capacity < capacity or held.shadow_rays < shadow_rays:
+        held = _Scratch(max(capacity, held.capacity), max(shadow_rays, held.shadow_rays))
+    _local.scratch = held
+    return held
+
+
+def _follow(
+    prepared: PreparedScene, scratch: _Scratch, n: int, block: int, max_depth: int, radiance: NDArray[np.float32]
+) -> RayCounts:
+    """Trace `n` camera rays of level 0 and all that they spawn, the deepest pending level first.
+
+    A level holds the children of one batch of at most `block` rays, so memory is bounded by depth.
+    Batches end between samples wherever a sample's rays fit in one: what a sample adds up to, and in
+    which order, does not depend on its neighbours in the block.
+    """
+    cutoff = SMALLEST_STEP / (prepared.scene.exposure * max(1.0, prepared.brightest))
+    pending = [[0, n]]
+    shadow_rays = reflections = refractions = 0
+    while pending:
+        depth = len(pending) - 1
+        start, end = pending[depth]
+        if start == end:
+            pending.pop()
+            continue
+        rays = scratch.level(depth)
+        stop = batch_end(rays.sample, start, end, block)
+        pending[depth][0] = stop
+        batch = some_rays(rays, start, stop)
+        spawned = _shade_batch(prepared, scratch, batch, depth, depth < max_depth, cutoff, radiance)
+        shadow_rays += int(spawned[SHADOWS])
+        reflections += int(spawned[REFLECTIONS])
+        refractions += int(spawned[REFRACTIONS])
+        if spawned[CHILDREN]:
+            pending.append([0, int(spawned[CHILDREN])])
+    return RayCounts(n, shadow_rays, reflections, refractions)
+
+
+def batch_end(sample: NDArray[np.int32], start: int, end: int, block: int) -> int:
+    """Where the batch that begins at `start` ends: after at most `block` rays, between two samples.
+
+    A single sample of more than `block` rays is cut after `block` of them.
+
+    Args:
+        sample: rising sample numbers of the rays.
+        start, end: rays start .. end - 1 are pending.
+        block: most rays of a batch.
+    """
+    if end - start <= block:
+        return end
+    limit = start + block
+    boundary = start + int(np.searchsorted(sample[start:end], sample[limit]))
+    return boundary if boundary > start else limit
+
+
+def _shade_batch(
+    prepared: PreparedScene,
+    scratch: _Scratch,
+    batch: Rays,
+    depth: int,
+    spawn: bool,
+    cutoff: float,
+    radiance: NDArray[np.float32],
+) -> NDArray[np.int64]:
+    """Trace one batch of rays, add what they see, and leave their children on the next level."""
+    hits = prepared.intersector.nearest(batch.origin, batch.direction)
+    counters = scratch.counters
+    shade(
+        prepared.surfaces, batch, hits, spawn, cutoff, scratch.level(depth + 1), scratch.shadows, radiance, counters
+    )
+    pending = int(counters[SHADOWS])
+    if pending:
+        shadows = first_shadow_rays(scratch.shadows, pending)
+        blocked = prepared.intersector.occluded(shadows.origin, shadows.direction, shadows.reach)
+        add_unblocked(shadows, blocked, radiance)
+    return counters
