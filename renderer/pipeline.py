@@ -67,9 +67,13 @@ class Renderer:
         """Number of rendering threads."""
         return self._pool.threads
 
-    def close(self) -> None:
-        """End the threads."""
-        self._pool.close()
+    def close(self, *, abandon: bool = False) -> None:
+        """End the threads, once the frames that were begun are finished.
+
+        Args:
+            abandon: True to give up those frames; whoever waits for them gets a RuntimeError.
+        """
+        self._pool.close(abandon=abandon)
 
     def forget_samples(self) -> None:
         """Drop everything traced so far; the next frame is traced anew."""

@@ -37,14 +37,15 @@ def phong_lobe(
     Args:
         s: the surface.
         lx, ly, lz: unit direction to the light.
-        vx, vy, vz: unit direction to the eye.
+        vx, vy, vz: direction to the eye, of unit length but for float32 rounding, which a large exponent
+            would turn into a factor.
         shininess: exponent, 0 to 1e9.
     """
     twice = 2.0 * (s.nx * lx + s.ny * ly + s.nz * lz)
     cosine = (twice * s.nx - lx) * vx + (twice * s.ny - ly) * vy + (twice * s.nz - lz) * vz
     if not cosine > 0.0:
         return 0.0
-    return float(min(1.0, cosine) ** shininess)
+    return float(min(1.0, cosine / math.sqrt(vx * vx + vy * vy + vz * vz)) ** shininess)
 
 
 @formula
@@ -162,10 +163,8 @@ def shade(
         if ray + AHEAD < len(primitive_of):
             prefetch(facets, max(0, primitive_of[ray + AHEAD]))
         sample = sample_of[ray]
-        wr, wg, wb = float(weight[ray, 0]), float(weight[ray, 1]), float(weight[ray, 2])
-        dx, dy, dz = float(direction[ray, 0]), float(direction[ray, 1]), float(direction[ray, 2])
-        inverse = 1.0 / math.sqrt(dx * dx + dy * dy + dz * dz)
-        dx, dy, dz = dx * inverse, dy * inverse, dz * inverse
+        wr, wg, wb = np.float64(weight[ray, 0]), np.float64(weight[ray, 1]), np.float64(weight[ray, 2])
+        dx, dy, dz = np.float64(direction[ray, 0]), np.float64(direction[ray, 1]), np.float64(direction[ray, 2])
         primitive = primitive_of[ray]
         if primitive < 0:
             high = min(1.0, max(0.0, dy))
@@ -175,13 +174,13 @@ def shade(
             radiance[sample, 2] += wb * (high * around[0, 2] + low * around[1, 2])
             continue
         if primitive < triangles:
-            s = triangle_surface(facets, primitive, float(hit_u[ray]), float(hit_v[ray]), dx, dy, dz)
+            s = triangle_surface(facets, primitive, np.float64(hit_u[ray]), np.float64(hit_v[ray]), dx, dy, dz)
         else:
             k = primitive - triangles
             s = sphere_surface(
                 center[k, 0], center[k, 1], center[k, 2], radius[k], int(np.int64(sphere_material[k])),
-                float(origin[ray, 0]), float(origin[ray, 1]), float(origin[ray, 2]),
-                float(direction[ray, 0]), float(direction[ray, 1]), float(direction[ray, 2]),
+                np.float64(origin[ray, 0]), np.float64(origin[ray, 1]), np.float64(origin[ray, 2]),
+                dx, dy, dz,
             )  # fmt: skip
         material = materials[s.material]
         kr, kg, kb = float(material.diffuse_red), float(material.diffuse_green), float(material.diffuse_blue)
@@ -221,7 +220,7 @@ def shade(
             continue
         mr, mg, mb = float(material.reflection_red), float(material.reflection_green), float(material.reflection_blue)
         if material.calls & BOUNDARY != 0:
-            eta = 1.0 / material.ior if s.entering else float(material.ior)
+            eta = 1.0 / material.ior if s.entering else np.float64(material.ior)
             cosine = -(dx * s.nx + dy * s.ny + dz * s.nz)
             refracted = refracted_cosine(cosine, eta)
             share = fresnel(cosine, refracted, eta)

@@ -168,10 +168,10 @@ def nearest_spheres(
     centers, radii = tree.center, tree.radius
     stack = np.zeros(STACK_SIZE, dtype=np.int32)
     for ray in range(len(distance)):
-        ox, oy, oz = float(origin[ray, 0]), float(origin[ray, 1]), float(origin[ray, 2])
-        dx, dy, dz = float(direction[ray, 0]), float(direction[ray, 1]), float(direction[ray, 2])
+        ox, oy, oz = np.float64(origin[ray, 0]), np.float64(origin[ray, 1]), np.float64(origin[ray, 2])
+        dx, dy, dz = np.float64(direction[ray, 0]), np.float64(direction[ray, 1]), np.float64(direction[ray, 2])
         ix, iy, iz = 1.0 / dx, 1.0 / dy, 1.0 / dz
-        best = float(distance[ray]) if primitive[ray] >= 0 else math.inf
+        best = np.float64(distance[ray]) if primitive[ray] >= 0 else math.inf
         found = -1
         stack[0] = 0
         depth = 1
@@ -219,10 +219,10 @@ def shade_spheres(
     for ray in range(len(reach)):
         if blocked[ray] != 0:
             continue
-        ox, oy, oz = float(origin[ray, 0]), float(origin[ray, 1]), float(origin[ray, 2])
-        dx, dy, dz = float(direction[ray, 0]), float(direction[ray, 1]), float(direction[ray, 2])
+        ox, oy, oz = np.float64(origin[ray, 0]), np.float64(origin[ray, 1]), np.float64(origin[ray, 2])
+        dx, dy, dz = np.float64(direction[ray, 0]), np.float64(direction[ray, 1]), np.float64(direction[ray, 2])
         ix, iy, iz = 1.0 / dx, 1.0 / dy, 1.0 / dz
-        limit = float(reach[ray])
+        limit = np.float64(reach[ray])
         stack[0] = 0
         depth = 1
         while depth > 0 and blocked[ray] == 0:

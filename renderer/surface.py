@@ -81,9 +81,9 @@ def triangle_surface(
     removes the black triangles at the shadow terminator (Hanika, Ray Tracing Gems II, 2021, ch. 4).
     """
     b0 = 1.0 - b1 - b2
-    ax, ay, az = float(f[t, 0]), float(f[t, 1]), float(f[t, 2])
-    bx, by, bz = float(f[t, 8]), float(f[t, 9]), float(f[t, 10])
-    cx, cy, cz = float(f[t, 16]), float(f[t, 17]), float(f[t, 18])
+    ax, ay, az = np.float64(f[t, 0]), np.float64(f[t, 1]), np.float64(f[t, 2])
+    bx, by, bz = np.float64(f[t, 8]), np.float64(f[t, 9]), np.float64(f[t, 10])
+    cx, cy, cz = np.float64(f[t, 16]), np.float64(f[t, 17]), np.float64(f[t, 18])
     px, py, pz = b0 * ax + b1 * bx + b2 * cx, b0 * ay + b1 * by + b2 * cy, b0 * az + b1 * bz + b2 * cz
     ix, iy, iz, jx, jy, jz = bx - ax, by - ay, bz - az, cx - ax, cy - ay, cz - az
     gx, gy, gz = iy * jz - iz * jy, iz * jx - ix * jz, ix * jy - iy * jx
@@ -94,9 +94,9 @@ def triangle_surface(
     nx, ny, nz = gx, gy, gz
     lift_x, lift_y, lift_z = 0.0, 0.0, 0.0
     if f[t, SMOOTH_COLUMN] != 0.0:
-        n0x, n0y, n0z = face * float(f[t, 3]), face * float(f[t, 4]), face * float(f[t, 5])
-        n1x, n1y, n1z = face * float(f[t, 11]), face * float(f[t, 12]), face * float(f[t, 13])
-        n2x, n2y, n2z = face * float(f[t, 19]), face * float(f[t, 20]), face * float(f[t, 21])
+        n0x, n0y, n0z = face * np.float64(f[t, 3]), face * np.float64(f[t, 4]), face * np.float64(f[t, 5])
+        n1x, n1y, n1z = face * np.float64(f[t, 11]), face * np.float64(f[t, 12]), face * np.float64(f[t, 13])
+        n2x, n2y, n2z = face * np.float64(f[t, 19]), face * np.float64(f[t, 20]), face * np.float64(f[t, 21])
         sx, sy, sz = b0 * n0x + b1 * n1x + b2 * n2x, b0 * n0y + b1 * n1y + b2 * n2y, b0 * n0z + b1 * n1z + b2 * n2z
         length = math.sqrt(sx * sx + sy * sy + sz * sz)
         if length > 0.0:

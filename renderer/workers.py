@@ -58,10 +58,20 @@ class WorkerPool:
         if job.error is not None:
             raise job.error
 
-    def close(self) -> None:
-        """Let the jobs that were begun finish, then end the threads."""
+    def close(self, *, abandon: bool = False) -> None:
+        """Let the jobs that were begun finish, then end the threads.
+
+        Args:
+            abandon: True to run no further block of them; whoever waits for them gets a RuntimeError.
+        """
         with self._changed:
             self._closed = True
+            while abandon and self._jobs:
+                job = self._jobs.popleft()
+                job.error = job.error or RuntimeError("the worker pool was closed before the job was done")
+                job.count = job.taken
+                if job.finished == job.count:
+                    job.done.set()
             self._changed.notify_all()
         for member in self._members:
             member.join()

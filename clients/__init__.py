@@ -1,0 +1,1 @@
+"""What talks to the service, and the command line."""

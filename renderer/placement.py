@@ -1,0 +1,51 @@
+"""A mesh moved to its place in the scene."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.scene import Mesh
+
+
+def placed(mesh: Mesh, world_from_mesh: NDArray[np.float64]) -> Mesh:
+    """`mesh` under an affine transform, which may mirror and scale unequally.
+
+    Args:
+        mesh: to be moved; it is not changed.
+        world_from_mesh: (4, 4) float64 with last row 0 0 0 1.
+
+    Returns:
+        The mesh with moved vertices. Normals follow by the inverse transpose, so that they stay square to
+        the surface; where the transform mirrors, the faces are wound the other way, so that counter-clockwise
+        still means outside.
+
+    Raises:
+        SceneError: for vertices that leave the range of a scene.
+    """
+    linear = world_from_mesh[:3, :3]
+    cofactor, mirrors = _cofactor(linear)
+    with np.errstate(all="ignore"):
+        vertices = mesh.vertices @ linear.T + world_from_mesh[:3, 3]
+        normals = None if mesh.normals is None else mesh.normals @ cofactor.T
+    return dataclasses.replace(
+        mesh,
+        vertices=vertices,
+        faces=np.ascontiguousarray(mesh.faces[:, ::-1]) if mirrors else mesh.faces,
+        normals=normals,
+    )
+
+
+def _cofactor(linear: NDArray[np.float64]) -> tuple[NDArray[np.float64], bool]:
+    """A positive multiple of the inverse transpose, and whether `linear` mirrors.
+
+    The cofactors are the determinant times the inverse transpose; they need no division, so a transform
+    that flattens the mesh is no special case.
+    """
+    size = float(np.abs(linear).max())
+    a, b, c = linear / size if size > 0.0 else linear
+    cofactor = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)])
+    mirrors = bool(np.dot(a, cofactor[0]) < 0.0)
+    return (-cofactor if mirrors else cofactor), mirrors

@@ -1,0 +1,281 @@
+"""Scenes in a folder: scene.toml beside the mesh and texture files that it names.
+
+A worked example, `vase/scene.toml`; every field is optional but those of a mesh, sphere or light without
+"or" behind them:
+
+```toml
+title = "A vase on a table"
+exposure = 1.0                     # factor from radiance to the display's 0..1
+
+[camera]                           # left out: frames the whole scene
+position = [0.0, 1.5, 2.0]         # metres, y up
+look_at = [0.0, 0.9, 0.0]
+up = [0.0, 1.0, 0.0]               # or this default
+vertical_fov_deg = 40.0            # or 40
+
+[surroundings]                     # left out: a pale studio; given: black but for what it says
+zenith = [0.3, 0.4, 0.6]           # radiance straight up
+horizon = [0.8, 0.8, 0.8]
+ambient = [0.1, 0.1, 0.1]          # light from everywhere
+
+[materials.gold]                   # the fields of renderer.scene.Material
+diffuse = [0.35, 0.25, 0.08]
+specular = [2.0, 1.6, 0.8]
+shininess = 120.0
+reflection = [0.5, 0.4, 0.2]
+
+[materials.wood]
+diffuse = [1.0, 1.0, 1.0]          # or 1 under a texture
+diffuse_texture = "wood.png"
+
+[materials.glass]
+diffuse = [0.0, 0.0, 0.0]
+transmission = [1.0, 1.0, 1.0]
+ior = 1.5
+
+[[mesh]]
+file = "vase.obj"                  # OBJ, GLB, glTF, PLY or STL
+material = "gold"                  # or the file's own; { Lid = "wood" } replaces only its material Lid
+scale = 0.01                       # or 1; [1, 2, 1] scales unequally, a negative factor mirrors
+rotate_deg = [0.0, 30.0, 0.0]      # or 0: about x, then y, then z, after scaling
+translate = [0.0, 0.8, 0.0]        # or 0, after rotating
+casts_shadows = true               # or true
+
+[[sphere]]
+center = [0.5, 0.9, 0.2]
+radius = 0.1
+material = "glass"                 # or clay
+casts_shadows = true
+
+[[light]]                          # none: framed lights; light = [] leaves the scene to its surroundings
+kind = "point"
+position = [2.0, 3.0, 2.0]
+intensity = [40.0, 40.0, 40.0]     # W/sr, inverse-square falloff
+casts_shadows = true
+```
+
+Files are named from the folder on, and must lie inside it.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import tomllib
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.camera import MAX_POSITION_M, Camera
+from renderer.codec import decode_texture
+from renderer.errors import SceneError, SettingsError
+from renderer.fields import Fields
+from renderer.folder import MAX_FILE_BYTES, Folder
+from renderer.framing import DEFAULT_MATERIAL, STUDIO, bounding_sphere, framed_camera, framed_lights
+from renderer.mesh_file import MAX_TRIANGLES, read_meshes
+from renderer.placement import placed
+from renderer.scene import (
+    BLACK,
+    MAX_COORDINATE_M,
+    MAX_RADIANCE,
+    MAX_SHININESS,
+    Material,
+    Mesh,
+    PointLight,
+    Scene,
+    Sphere,
+    Surroundings,
+    Texture,
+)
+
+SCENE_FILE: Final = "scene.toml"
+"""Name of the file that makes a folder a scene."""
+
+MAX_INTENSITY: Final = 1e24
+"""Largest intensity of a light [W/sr]."""
+
+_DEFAULTS: Final = Material()
+
+
+def load_scene_folder(
+    folder: Path, *, label: str | None = None, max_bytes: int = MAX_FILE_BYTES, max_triangles: int = MAX_TRIANGLES
+) -> Scene:
+    """The scene that `folder`/scene.toml describes.
+
+    Args:
+        folder: nothing outside it is opened.
+        label: what messages call it; its path unless given.
+        max_bytes: refuse larger files, each.
+        max_triangles: refuse more triangles, of all meshes together.
+
+    Raises:
+        SceneError: "folder/scene.toml: field: expected ..., found ...", or the same of a file it names.
+    """
+    tree = Folder(folder.resolve(), str(folder) if label is None else label, max_bytes)
+    file = tree.file_label(SCENE_FILE)
+    data, _ = tree.read(SCENE_FILE, file)
+    try:
+        values = tomllib.loads(data.decode("utf-8-sig"))
+    except (ValueError, RecursionError) as error:
+        raise SceneError(f"{file}: expected TOML, found a mistake: {error}") from None
+    return _Reader(tree, max_triangles).scene(Fields(values, file))
+
+
+@dataclass(slots=True)
+class _Reader:
+    """The state of reading one scene; each texture and each mesh file is read once."""
+
+    folder: Folder
+    max_triangles: int
+    materials: dict[str, Material] = field(default_factory=dict)
+    textures: dict[str, Texture] = field(default_factory=dict)
+    files: dict[str, tuple[Mesh, ...]] = field(default_factory=dict)
+    triangles: int = 0
+
+    def scene(self, top: Fields) -> Scene:
+        """The scene of the file's top level."""
+        title = top.text("title", "")
+        exposure = top.number("exposure", 0.0, MAX_RADIANCE, 1.0, open_low=True)
+        materials = top.table("materials")
+        for name in materials.names():
+            self.materials[name] = self._material(materials.table(name), name)
+        meshes = [mesh for fields in top.tables("mesh") for mesh in self._meshes(fields)]
+        spheres = [self._sphere(fields) for fields in top.tables("sphere")]
+        lights = tuple(_light(fields) for fields in top.tables("light"))
+        surroundings = _surroundings(top.table("surroundings")) if "surroundings" in top else STUDIO
+        camera = _camera(top.table("camera")) if "camera" in top else None
+        top.refuse_unknown()
+        if camera is None or "light" not in top:
+            bounds = bounding_sphere(meshes, spheres, top.file)
+            camera = camera or framed_camera(meshes, spheres, bounds)
+            lights = lights if "light" in top else framed_lights(bounds, top.file)
+        return Scene(tuple(meshes), tuple(spheres), lights, surroundings, camera, exposure, title)
+
+    def _material(self, fields: Fields, name: str) -> Material:
+        texture = self._texture(fields) if "diffuse_texture" in fields else None
+        material = Material(
+            name,
+            diffuse=fields.rgb("diffuse", 1.0, _DEFAULTS.diffuse if texture is None else (1.0, 1.0, 1.0)),
+            specular=fields.rgb("specular", MAX_RADIANCE, _DEFAULTS.specular),
+            shininess=fields.number("shininess", 0.0, MAX_SHININESS, _DEFAULTS.shininess),
+            emission=fields.rgb("emission", MAX_RADIANCE, _DEFAULTS.emission),
+            reflection=fields.rgb("reflection", 1.0, _DEFAULTS.reflection),
+            transmission=fields.rgb("transmission", 1.0, _DEFAULTS.transmission),
+            ior=fields.number("ior", 0.1, 10.0, _DEFAULTS.ior),
+            diffuse_texture=texture,
+        )
+        fields.refuse_unknown()
+        return material
+
+    def _texture(self, fields: Fields) -> Texture:
+        where = f"{fields.file}: {fields.where('diffuse_texture')}"
+        data, inner = self.folder.read(fields.text("diffuse_texture"), where)
+        if inner not in self.textures:
+            self.textures[inner] = decode_texture(data, self.folder.file_label(inner))
+        return self.textures[inner]
+
+    def _meshes(self, fields: Fields) -> list[Mesh]:
+        """The meshes of one [[mesh]] table, in their place."""
+        name = fields.text("file")
+        if name not in self.files:
+            where = f"{fields.file}: {fields.where('file')}"
+            self.files[name] = read_meshes(self.folder, name, where, self.max_triangles)
+        meshes = self.files[name]
+        self.triangles += sum(len(mesh.faces) for mesh in meshes)
+        if self.triangles > self.max_triangles:
+            raise fields.refuse("file", f"at most {self.max_triangles} triangles in all", self.triangles)
+        matrix = _matrix(fields)
+        casts_shadows = fields.flag("casts_shadows", True)
+        replacements = self._replacements(fields, [mesh.material.name for mesh in meshes])
+        fields.refuse_unknown()
+        return [
+            placed(
+                dataclasses.replace(
+                    mesh,
+                    material=replacements.get(mesh.material.name, mesh.material),
+                    casts_shadows=casts_shadows,
+                ),
+                matrix,
+            )
+            for mesh in meshes
+        ]
+
+    def _replacements(self, fields: Fields, names: list[str]) -> dict[str, Material]:
+        """By name, the materials that take the place of the file's own."""
+        if "material" not in fields:
+            return {}
+        if isinstance(fields.value("material"), str):
+            material = self._named(fields, "material")
+            return dict.fromkeys(names, material)
+        table = fields.table("material")
+        for name in table.names():
+            if name not in names:
+                raise fields.refuse("material", f"materials of the file ({', '.join(dict.fromkeys(names))})", name)
+        return {name: self._named(table, name) for name in table.names()}
+
+    def _named(self, fields: Fields, key: str) -> Material:
+        if not self.materials:
+            raise fields.refuse(key, "a material that a table [materials.NAME] describes", fields.value(key))
+        return self.materials[fields.choice(key, tuple(self.materials))]
+
+    def _sphere(self, fields: Fields) -> Sphere:
+        sphere = Sphere(
+            fields.point("center", MAX_COORDINATE_M),
+            fields.number("radius", 0.0, MAX_COORDINATE_M, open_low=True),
+            self._named(fields, "material") if "material" in fields else DEFAULT_MATERIAL,
+            fields.flag("casts_shadows", True),
+        )
+        fields.refuse_unknown()
+        return sphere
+
+
+def _light(fields: Fields) -> PointLight:
+    fields.choice("kind", ("point",))
+    light = PointLight(
+        fields.point("position", MAX_COORDINATE_M),
+        fields.rgb("intensity", MAX_INTENSITY),
+        fields.flag("casts_shadows", True),
+    )
+    fields.refuse_unknown()
+    return light
+
+
+def _surroundings(fields: Fields) -> Surroundings:
+    zenith, horizon, ambient = (fields.rgb(key, MAX_RADIANCE, BLACK) for key in ("zenith", "horizon", "ambient"))
+    fields.refuse_unknown()
+    return Surroundings(zenith, horizon, ambient)
+
+
+def _camera(fields: Fields) -> Camera:
+    try:
+        camera = Camera(
+            fields.point("position", MAX_POSITION_M),
+            fields.point("look_at", MAX_POSITION_M),
+            fields.point("up", MAX_POSITION_M, (0.0, 1.0, 0.0)),
+            fields.number("vertical_fov_deg", 1e-3, 179.0, 40.0),
+        )
+    except SettingsError as error:
+        raise fields.in_file(error) from None
+    fields.refuse_unknown()
+    return camera
+
+
+def _matrix(fields: Fields) -> NDArray[np.float64]:
+    """(4, 4) transform of a [[mesh]] table: translate * rotate * scale."""
+    if isinstance(fields.value("scale"), list):
+        scale = fields.numbers("scale", 3, -MAX_COORDINATE_M, MAX_COORDINATE_M)
+    else:
+        scale = (fields.number("scale", -MAX_COORDINATE_M, MAX_COORDINATE_M, 1.0),) * 3
+    if 0.0 in scale:
+        raise fields.refuse("scale", "factors other than 0", fields.value("scale"))
+    x, y, z = (math.radians(angle) for angle in fields.point("rotate_deg", 1e6, (0.0, 0.0, 0.0)))
+    about_x = np.array([[1, 0, 0], [0, math.cos(x), -math.sin(x)], [0, math.sin(x), math.cos(x)]])
+    about_y = np.array([[math.cos(y), 0, math.sin(y)], [0, 1, 0], [-math.sin(y), 0, math.cos(y)]])
+    about_z = np.array([[math.cos(z), -math.sin(z), 0], [math.sin(z), math.cos(z), 0], [0, 0, 1]])
+    matrix = np.eye(4)
+    matrix[:3, :3] = about_z @ about_y @ about_x * np.array(scale)
+    matrix[:3, 3] = fields.point("translate", MAX_COORDINATE_M, (0.0, 0.0, 0.0))
+    return matrix

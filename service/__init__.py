@@ -1,0 +1,1 @@
+"""The network service: HTTP in front of the renderer."""

@@ -1,0 +1,95 @@
+"""The service put together: settings in, an ASGI application out. Nothing of it outlives the application."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+
+from fastapi import FastAPI
+from starlette.middleware import Middleware
+from starlette.middleware.cors import CORSMiddleware
+
+from renderer.library import SceneLibrary
+from renderer.pipeline import Renderer
+from service import cells, frames, pages, scenes
+from service.access import OwnNamesOnly, SafeHeaders, SmallBodiesOnly, TokenOnly
+from service.catalogue import Catalogue
+from service.desk import Desk
+from service.jobs import JobQueue
+from service.openapi import describe_api
+from service.problem import answer_errors
+from service.rendering import Studio
+from service.settings import Settings
+
+LOOKUP_THREADS = 4
+QUEUED_LOOKUPS = 64
+"""Lookups are quick (a cell map, a description), so many may wait."""
+
+log = logging.getLogger(__name__)
+
+
+def create_app(
+    settings: Settings, renderer: Renderer | None = None, announce: Callable[[str], None] = log.info
+) -> FastAPI:
+    """The application.
+
+    Args:
+        settings: limits and access.
+        renderer: renders for this application and others; None for one of its own.
+        announce: receives a line when the kernels begin to compile and one when frames can be rendered.
+    """
+
+    @asynccontextmanager
+    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+        own = renderer or Renderer(settings.threads, settings.map_cache_bytes, settings.store_bytes)
+        library = SceneLibrary(settings.scenes, settings.scene_bytes)
+        desk = Desk(
+            Studio(settings, own, library),
+            Catalogue(library),
+            JobQueue("gazetrace-render", settings.max_concurrent_renders, settings.max_queued_renders),
+            JobQueue("gazetrace-lookup", LOOKUP_THREADS, QUEUED_LOOKUPS),
+        )
+        app.state.desk = desk
+        desk.studio.warm_up(announce)
+        yield
+        desk.studio.close()
+        desk.renders.close()
+        desk.lookups.close()
+        if renderer is None:
+            await asyncio.to_thread(own.close, abandon=True)
+
+    app = FastAPI(
+        lifespan=lifespan,
+        middleware=_gates(settings),
+        openapi_url=None,
+        docs_url=None,
+        redoc_url=None,
+        redirect_slashes=False,
+    )
+    answer_errors(app)
+    for part in (frames, cells, scenes, pages):
+        app.include_router(part.router)
+    describe_api(app, settings)
+    return app
+
+
+def _gates(settings: Settings) -> list[Middleware]:
+    """What a request passes, outermost first."""
+    gates = [Middleware(SafeHeaders), Middleware(OwnNamesOnly, settings=settings)]
+    if settings.allowed_origins:
+        gates.append(
+            Middleware(
+                CORSMiddleware,
+                allow_origins=settings.allowed_origins,
+                allow_methods=("GET", "POST"),
+                allow_headers=("Authorization", "Content-Type", "If-None-Match"),
+                expose_headers=("ETag", "Gazetrace-Frame", "Retry-After", "Server-Timing"),
+            )
+        )
+    return [
+        *gates,
+        Middleware(TokenOnly, settings=settings),
+        Middleware(SmallBodiesOnly, max_bytes=settings.max_body_bytes),
+    ]

@@ -1,0 +1,90 @@
+"""What people and supervisors look at: the page, the documentation, health."""
+
+from __future__ import annotations
+
+import hashlib
+from importlib import resources
+from typing import Annotated, Literal
+
+from fastapi import APIRouter, HTTPException, Path, Request
+from pydantic import BaseModel, Field
+from starlette.responses import HTMLResponse, Response
+
+from service.desk import TheDesk
+from service.docs import documentation
+from service.openapi import ERRORS
+
+MEDIA_TYPES = {
+    "index.html": "text/html",
+    "docs.css": "text/css",
+    "page.css": "text/css",
+    "page.js": "text/javascript",
+    "frame_source.js": "text/javascript",
+    "icon.svg": "image/svg+xml",
+}
+"""The page's files, and what each is."""
+
+router = APIRouter()
+
+
+class Health(BaseModel):
+    """The process answers."""
+
+    status: Literal["ok"] = "ok"
+
+
+class Readiness(BaseModel):
+    """Frames can be rendered."""
+
+    status: Literal["ready"] = "ready"
+    running: int = Field(description="frames being rendered")
+    waiting: int = Field(description="frames that wait for their turn")
+
+
+@router.get("/", include_in_schema=False)
+async def index(request: Request) -> Response:
+    """The page: look at a scene with the mouse as the gaze."""
+    return _file("index.html", request)
+
+
+@router.get("/page/{name}", include_in_schema=False)
+async def page_file(name: Annotated[str, Path()], request: Request) -> Response:
+    """A file of the page."""
+    if name not in MEDIA_TYPES:
+        raise HTTPException(404)
+    return _file(name, request)
+
+
+@router.get("/docs", include_in_schema=False)
+async def docs(request: Request) -> HTMLResponse:
+    """The OpenAPI document for people; needs nothing from elsewhere, so it works without a network."""
+    return HTMLResponse(documentation(request.app.openapi()))
+
+
+@router.get("/openapi.json", include_in_schema=False)
+async def openapi(request: Request) -> dict[str, object]:
+    """The OpenAPI document."""
+    document: dict[str, object] = request.app.openapi()
+    return document
+
+
+@router.get("/healthz", tags=["health"], summary="Does the process answer?")
+async def healthz() -> Health:
+    """Answer at once, also while kernels compile and frames are rendered."""
+    return Health()
+
+
+@router.get("/readyz", tags=["health"], summary="Can frames be rendered?", responses={503: ERRORS[503]})
+async def readyz(desk: TheDesk) -> Readiness:
+    """Answer 503 until the kernels are compiled."""
+    desk.studio.require_ready()
+    return Readiness(running=desk.renders.running, waiting=desk.renders.waiting)
+
+
+def _file(name: str, request: Request) -> Response:
+    data = resources.files("service").joinpath("page", name).read_bytes()
+    etag = f'"{hashlib.blake2b(data, digest_size=16).hexdigest()}"'
+    headers = {"ETag": etag, "Cache-Control": "no-cache"}
+    if request.headers.get("if-none-match") == etag:
+        return Response(status_code=304, headers=headers)
+    return Response(data, media_type=MEDIA_TYPES[name], headers=headers)

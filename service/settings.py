@@ -1,0 +1,178 @@
+"""What whoever runs the service decides: where it listens, who may ask, how much one request may cost."""
+
+from __future__ import annotations
+
+import ipaddress
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+from renderer.display import MAX_SIDE_PX
+from renderer.errors import SettingsError, require_integer
+from renderer.quality import MAX_DEPTH, MAX_SAMPLES
+
+VARIABLE_PREFIX = "GAZETRACE_"
+
+SHORTEST_TOKEN = 8
+"""Fewest characters of a token; a shorter one is soon guessed."""
+
+MOST_THREADS = 1024
+MOST_RENDERS = 64
+MOST_QUEUED = 10_000
+MOST_BYTES = 1 << 44
+MOST_CAMERA_RAYS = 10**13
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """Every setting of the service; `GAZETRACE_PORT` in the environment sets `port`, and so on.
+
+    Attributes:
+        host: address to listen on; other than this machine's own (loopback) it needs `token` or `insecure`.
+        port: port to listen on, 0 for any free one.
+        token: what a client must send as `Authorization: Bearer TOKEN`; None asks nobody.
+        insecure: True to listen beyond this machine without a token.
+        scenes: folder of scene folders; None for the built-in scenes alone.
+        threads: cores to render on; None for all.
+        max_pixels: largest frame [px]; an 8K screen.
+        max_samples_per_cell: most camera rays a cell.
+        max_depth: most mirrors and boundaries a ray may meet.
+        max_camera_rays: most camera rays a frame: cells times samples a cell.
+        max_body_bytes: largest request body.
+        max_concurrent_renders: frames rendered at once.
+        max_queued_renders: frames that may wait for their turn; beyond, a client is told to come back.
+        map_cache_bytes: memory for cell maps.
+        store_bytes: memory for samples of earlier frames.
+        scene_bytes: memory for loaded scenes.
+        allowed_hosts: further names this service goes by, for a proxy in front of it; `*` for any.
+        allowed_origins: origins, such as `https://lab.example`, whose pages may use it from a browser.
+
+    Raises:
+        SettingsError: naming the setting, for a value out of range, and for an unsafe address.
+    """
+
+    host: str = "127.0.0.1"
+    port: int = 8321
+    token: str | None = field(default=None, repr=False)
+    insecure: bool = False
+    scenes: Path | None = None
+    threads: int | None = None
+    max_pixels: int = 33_177_600
+    max_samples_per_cell: int = 256
+    max_depth: int = 16
+    max_camera_rays: int = 200_000_000
+    max_body_bytes: int = 64 << 10
+    max_concurrent_renders: int = 4
+    max_queued_renders: int = 16
+    map_cache_bytes: int = 256 << 20
+    store_bytes: int = 512 << 20
+    scene_bytes: int = 1 << 30
+    allowed_hosts: tuple[str, ...] = ()
+    allowed_origins: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not self.host:
+            raise SettingsError("host", "an address or a name", self.host)
+        require_integer("port", self.port, 0, 65_535)
+        if self.threads is not None:
+            require_integer("threads", self.threads, 1, MOST_THREADS)
+        require_integer("max_pixels", self.max_pixels, 1, MAX_SIDE_PX**2)
+        require_integer("max_samples_per_cell", self.max_samples_per_cell, 1, MAX_SAMPLES)
+        require_integer("max_depth", self.max_depth, 0, MAX_DEPTH)
+        require_integer("max_camera_rays", self.max_camera_rays, 1, MOST_CAMERA_RAYS)
+        require_integer("max_body_bytes", self.max_body_bytes, 1, MOST_BYTES)
+        require_integer("max_concurrent_renders", self.max_concurrent_renders, 1, MOST_RENDERS)
+        require_integer("max_queued_renders", self.max_queued_renders, 0, MOST_QUEUED)
+        for name in ("map_cache_bytes", "store_bytes", "scene_bytes"):
+            require_integer(name, getattr(self, name), 0, MOST_BYTES)
+        if self.scenes is not None and not os.path.isdir(self.scenes):
+            raise SettingsError("scenes", "a folder", str(self.scenes))
+        for origin in self.allowed_origins:
+            _require_origin(origin)
+        self._require_token()
+
+    def _require_token(self) -> None:
+        """Refuse a weak token, and an address that others reach without one."""
+        if self.token is not None:
+            if not self.token.isascii() or not self.token.isprintable() or " " in self.token:
+                raise SettingsError("token", "visible ASCII characters", "others")
+            if len(self.token) < SHORTEST_TOKEN:
+                raise SettingsError("token", f"{SHORTEST_TOKEN} characters or more", f"{len(self.token)} characters")
+        elif not self.insecure and not is_loopback(self.host):
+            raise SettingsError(
+                "host", "127.0.0.1, or a token (GAZETRACE_TOKEN) to listen beyond this machine", self.host
+            )
+
+    @classmethod
+    def from_environment(cls, environ: Mapping[str, str]) -> Settings:
+        """The settings that `environ` states, the rest as they are by default; an empty value states nothing.
+
+        Raises:
+            SettingsError: naming the variable.
+        """
+        stated: dict[str, Any] = {}
+        try:
+            for setting in fields(cls):
+                text = environ.get(VARIABLE_PREFIX + setting.name.upper(), "").strip()
+                if text:
+                    stated[setting.name] = _READ.get(setting.name, _integer)(setting.name, text)
+            return cls(**stated)
+        except SettingsError as error:
+            raise SettingsError(VARIABLE_PREFIX + error.field.upper(), error.expected, error.found) from None
+
+
+def is_loopback(host: str) -> bool:
+    """Whether `host` (a name or an address, no port) is this machine as seen from itself."""
+    if host.lower().rstrip(".") == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+def _require_origin(origin: str) -> None:
+    parts = urlsplit(origin)
+    if parts.scheme not in ("http", "https") or f"{parts.scheme}://{parts.netloc}" != origin or not parts.netloc:
+        raise SettingsError("allowed_origins", "origins such as https://lab.example", origin)
+
+
+def _text(_: str, text: str) -> str:
+    return text
+
+
+def _integer(name: str, text: str) -> int:
+    try:
+        return int(text)
+    except ValueError:
+        raise SettingsError(name, "an integer", text) from None
+
+
+def _switch(name: str, text: str) -> bool:
+    if text.lower() in ("1", "true", "yes", "on"):
+        return True
+    if text.lower() in ("0", "false", "no", "off"):
+        return False
+    raise SettingsError(name, "1 or 0", text)
+
+
+def _folder(_: str, text: str) -> Path:
+    return Path(text).expanduser()
+
+
+def _list(_: str, text: str) -> tuple[str, ...]:
+    return tuple(part.strip() for part in text.split(",") if part.strip())
+
+
+_READ: Mapping[str, Callable[[str, str], object]] = {
+    "host": _text,
+    "token": _text,
+    "insecure": _switch,
+    "scenes": _folder,
+    "allowed_hosts": _list,
+    "allowed_origins": _list,
+}
+"""How a variable's text is read where it is no integer."""

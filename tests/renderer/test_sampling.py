@@ -1,0 +1,160 @@
+"""Where camera rays go: the centre first, then even over the cell, the same for every gaze and frame."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from renderer.camera import Camera, ViewFrame
+from renderer.pipeline import Renderer
+from renderer.rays import make_rays
+from renderer.sampling import camera_rays, lattice_step
+from renderer.scene import Scene
+from tests.renderer.drawing import lamp, quad, shoot
+
+SCREEN_PX = 32_768
+PIXEL_VIEW = ViewFrame(np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]))
+"""A view whose ray through the pixel point (x, y) is (x, y, 1)."""
+
+CHI_SQUARE_63 = 131.7
+"""Exceeded by uniform numbers in 64 bins once in a million tests (Wilson and Hilferty)."""
+
+
+def places(
+    cells: list[tuple[int, int, int]],
+    samples: int,
+    *,
+    first: int = 0,
+    regular: bool = False,
+    screen: tuple[int, int] = (SCREEN_PX, SCREEN_PX),
+) -> NDArray[np.float64]:
+    """(cells, samples, 2) places of the camera rays of (x, y, side) cells, in pixels from the cell's corner."""
+    x, y, side = (np.array(column, dtype=np.int32) for column in zip(*cells, strict=True))
+    rays = make_rays(len(cells) * samples)
+    shifted = PIXEL_VIEW._replace(corner=np.array([-float(x[0]), -float(y[0]), 1.0]))
+    step = lattice_step(first + samples) if regular else 0
+    chosen = np.arange(len(cells), dtype=np.int32)
+    camera_rays(shifted, np.zeros(3, np.float32), *screen, x, y, side, chosen, first, samples, step, rays)
+    direction = rays.direction.astype(np.float64).reshape(len(cells), samples, 3)
+    corner = np.stack([x - x[0], y - y[0]], axis=1)[:, None]
+    return direction[..., :2] / direction[..., 2:] - corner
+
+
+def chi_square(u: NDArray[np.float64], v: NDArray[np.float64]) -> float:
+    """Of points in [0, 1)^2 sorted into 8 x 8 bins."""
+    counts = np.bincount((u * 8).astype(int) * 8 + (v * 8).astype(int), minlength=64)
+    assert len(counts) == 64
+    expected = len(u) / 64
+    return float(((counts - expected) ** 2 / expected).sum())
+
+
+@given(st.integers(0, 500), st.integers(0, 500), st.sampled_from([1, 2, 3, 8, 96]), st.integers(1, 40), st.booleans())
+def test_the_first_sample_goes_to_the_centre(x: int, y: int, side: int, samples: int, regular: bool) -> None:
+    np.testing.assert_allclose(places([(x, y, side)], samples, regular=regular)[0, 0], side / 2, rtol=1e-6)
+
+
+@given(
+    st.tuples(st.integers(0, 99), st.integers(0, 66), st.integers(1, 120)),
+    st.integers(2, 64),
+    st.booleans(),
+)
+def test_all_samples_lie_inside_the_cell_also_where_the_screen_ends(
+    cell: tuple[int, int, int], samples: int, regular: bool
+) -> None:
+    x, y, side = cell
+    inside = places([cell], samples, regular=regular, screen=(100, 67))[0]
+    assert (inside >= 0).all()
+    assert (inside[:, 0] <= min(side, 100 - x) * (1 + 1e-6)).all()
+    assert (inside[:, 1] <= min(side, 67 - y) * (1 + 1e-6)).all()
+
+
+def test_stochastic_samples_of_a_cell_are_uniform_over_it() -> None:
+    inside = places([(7, 9, 1)], 65_537)[0, 1:]
+    assert chi_square(inside[:, 0], inside[:, 1]) < CHI_SQUARE_63
+
+
+def test_the_same_sample_of_many_cells_is_uniform() -> None:
+    cells = [(x, y, 1) for y in range(256) for x in range(256)]
+    second = places(cells, 1, first=1)[:, 0] % 1.0
+    assert chi_square(second[:, 0], second[:, 1]) < CHI_SQUARE_63
+
+
+def test_neighbouring_cells_and_following_samples_are_independent() -> None:
+    cells = [(0, y, 1) for y in range(65_536 // 4)]
+    two = places(cells, 2, first=1) % 1.0
+    assert chi_square(two[:-1, 0, 0], two[1:, 0, 0]) < CHI_SQUARE_63
+    assert chi_square(two[:, 0, 1], two[:, 1, 1]) < CHI_SQUARE_63
+
+
+def test_cells_of_other_sides_at_the_same_place_get_other_samples() -> None:
+    one, two = places([(8, 8, 1)], 9)[0, 1:], places([(8, 8, 2)], 9)[0, 1:] / 2
+    assert np.abs(one - two).min() > 1e-6
+
+
+@given(st.integers(2, 50), st.integers(1, 50), st.integers(1, 7))
+def test_a_sample_does_not_depend_on_how_many_there_are(samples: int, more: int, first: int) -> None:
+    cell = (40, 24, 8)
+    few, many = places([cell], samples)[0], places([cell], samples + more)[0]
+    np.testing.assert_array_equal(few, many[:samples])
+    later = places([cell], samples, first=first)[0]
+    np.testing.assert_array_equal(later, places([cell], first + samples)[0, first:])
+
+
+def test_a_sample_does_not_depend_on_the_other_cells_of_the_frame() -> None:
+    cells = [(0, 0, 1), (64, 64, 8), (16, 40, 4), (1, 0, 1)]
+    together = places(cells, 5)
+    for index in range(len(cells)):
+        alone = places([(0, 0, 1), cells[index]], 5)[1]
+        np.testing.assert_array_equal(together[index], alone)
+
+
+@pytest.mark.parametrize("samples", [1, 2, 3, 4, 5, 7, 8, 9, 16, 25, 64, 100, 600])
+def test_regular_samples_cover_the_cell(samples: int) -> None:
+    """One in each of n columns, equally many in each row they use, no lean to a side beyond the first's."""
+    inside = places([(0, 0, 1)], samples, regular=True)[0]
+    shared = math.gcd(lattice_step(samples), samples)
+    rows = samples // shared
+    assert sorted((inside[:, 0] * samples + 1e-3).astype(int)) == list(range(samples))
+    counts = np.bincount((inside[:, 1] * rows + 1e-3).astype(int), minlength=rows)
+    assert (counts == shared).all()
+    lean = np.abs(inside.mean(axis=0) - 0.5)
+    assert lean[0] <= 0.5 / samples**2 + 1e-6
+    assert lean[1] <= 0.5 * shared / samples**2 + 1e-6
+
+
+def test_regular_samples_keep_apart() -> None:
+    for samples in (16, 64, 256):
+        inside = places([(0, 0, 1)], samples, regular=True)[0]
+        apart = np.linalg.norm(inside[:, None] - inside[None], axis=2) + 9 * np.eye(samples)
+        assert apart.min() > 0.5 / math.sqrt(samples)
+
+
+def test_h51_the_error_of_an_edge_falls_with_the_root_of_the_samples() -> None:
+    """An edge covers 0.3 of each of 4,096 cells; n from 4 to 1,024."""
+    covered = places([(x, y, 1) for y in range(64) for x in range(64)], 1024)[..., 0] % 1.0 < 0.3
+    counts = np.array([4, 16, 64, 256, 1024])
+    errors = [math.sqrt(((covered[:, :n].mean(axis=1) - 0.3) ** 2).mean()) for n in counts]
+    slope = np.polyfit(np.log(counts), np.log(errors), 1)[0]
+    assert slope == pytest.approx(-0.5, abs=0.05)
+
+
+def test_h51_an_edge_through_pixels_has_the_right_mean(renderer: Renderer) -> None:
+    """2,048 pixels of which 0.3 is bright: each within 5.5 and their mean within 4 standard errors."""
+    pixels, samples, share = 2048, 256, 0.3
+    camera = Camera((0, 0, 1), (0, 0, 0), vertical_fov_deg=90)
+    width = 2.0 / pixels
+    scene = Scene(meshes=(quad((-1, -1, 0), (1 - width / 2 + share * width, 0, 0), (0, 2, 0), lamp()),), camera=camera)
+    seen = shoot(renderer, scene, 1, pixels, samples=samples).pixels[..., 0].ravel()
+    variance = share * (1 - share)
+    z = (seen - share) * math.sqrt(samples / variance)
+    assert np.abs(z).max() < 5.5
+    assert abs(z.mean()) * math.sqrt(pixels) < 4.0
+
+
+def test_a_lattice_of_one_or_two_points_exists() -> None:
+    assert lattice_step(1) == lattice_step(2) == 1

@@ -1,0 +1,269 @@
+"""scene.toml: every field arrives where it belongs, every mistake is told with its place."""
+
+from __future__ import annotations
+
+import io
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import renderer.scene_file
+from renderer.errors import SceneError
+from renderer.framing import DEFAULT_MATERIAL, STUDIO, frame_meshes
+from renderer.scene import Scene, Surroundings
+from renderer.scene_file import load_scene_folder
+
+VASE = """mtllib vase.mtl
+v 0 0 0
+v 100 0 0
+v 0 100 0
+v 0 0 100
+usemtl Body
+f 1 3 2
+f 1 4 3
+usemtl Lid
+f 1 2 4
+f 2 3 4
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A folder with the files of the worked example."""
+    place = tmp_path / "vase"
+    place.mkdir()
+    (place / "vase.obj").write_text(VASE)
+    (place / "vase.mtl").write_text("newmtl Body\nKd 0.1 0.2 0.3\nnewmtl Lid\nKd 0.4 0.5 0.6\n")
+    picture = io.BytesIO()
+    Image.new("RGB", (2, 2), (10, 20, 30)).save(picture, "png")
+    (place / "wood.png").write_bytes(picture.getvalue())
+    return place
+
+
+def load(folder: Path, text: str) -> Scene:
+    (folder / "scene.toml").write_text(text)
+    return load_scene_folder(folder, label="vase")
+
+
+def refused(folder: Path, text: str) -> str:
+    with pytest.raises(SceneError) as caught:
+        load(folder, text)
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+def worked_example() -> str:
+    documentation = renderer.scene_file.__doc__
+    assert documentation is not None
+    return documentation.split("```toml\n")[1].split("```")[0]
+
+
+def test_the_worked_example(folder: Path) -> None:
+    scene = load(folder, worked_example())
+    assert scene.title == "A vase on a table"
+    assert scene.exposure == 1.0
+    assert scene.camera.position == (0.0, 1.5, 2.0)
+    assert scene.camera.vertical_fov_deg == 40.0
+    assert scene.surroundings == Surroundings((0.3, 0.4, 0.6), (0.8, 0.8, 0.8), (0.1, 0.1, 0.1))
+    assert [mesh.material.name for mesh in scene.meshes] == ["gold", "gold"]
+    assert scene.meshes[0].material.reflection == (0.5, 0.4, 0.2)
+    assert scene.spheres[0].material.transmission == (1.0, 1.0, 1.0)
+    assert scene.spheres[0].radius == 0.1
+    assert scene.lights[0].intensity == (40.0, 40.0, 40.0)
+    assert scene.lights[0].position == (2.0, 3.0, 2.0)
+
+
+def test_the_worked_example_shows_every_field(folder: Path) -> None:
+    stated = tomllib.loads(worked_example())
+    expected = {
+        "": {"title", "exposure", "camera", "surroundings", "materials", "mesh", "sphere", "light"},
+        "camera": {"position", "look_at", "up", "vertical_fov_deg"},
+        "surroundings": {"zenith", "horizon", "ambient"},
+        "mesh": {"file", "material", "scale", "rotate_deg", "translate", "casts_shadows"},
+        "sphere": {"center", "radius", "material", "casts_shadows"},
+        "light": {"kind", "position", "intensity", "casts_shadows"},
+    }
+    found = {
+        key: set(value[0] if isinstance(value, list) else value) for key, value in stated.items() if key in expected
+    }
+    assert {"": set(stated)} | found == expected
+    fields = set().union(*stated["materials"].values())
+    assert fields | {"emission"} == {
+        "diffuse", "specular", "shininess", "emission", "reflection", "transmission", "ior", "diffuse_texture"
+    }  # fmt: skip
+
+
+def test_a_mesh_in_its_place(folder: Path) -> None:
+    scene = load(
+        folder,
+        '[[mesh]]\nfile = "vase.obj"\nscale = [0.01, 0.02, 0.01]\nrotate_deg = [90, 0, 90]\ntranslate = [5, 0, 0]\n',
+    )
+    corner = {tuple(vertex) for mesh in scene.meshes for vertex in mesh.vertices.round(9).tolist()}
+    # x -> about x stays x -> about z is y; y -> about x is z; z -> about x is -y -> about z is x
+    assert corner == {(5.0, 0.0, 0.0), (5.0, 1.0, 0.0), (5.0, 0.0, 2.0), (6.0, 0.0, 0.0)}
+
+
+@pytest.mark.parametrize("scale", ["1", "-1", "[1, -2, 3]", "[-1, -1, 1]"])
+def test_mirrored_meshes_still_face_outwards(folder: Path, scale: str) -> None:
+    scene = load(folder, f'[[mesh]]\nfile = "vase.obj"\nscale = {scale}\n')
+    volume = 0.0
+    for mesh in scene.meshes:
+        a, b, c = (mesh.vertices[mesh.faces[:, i]] for i in range(3))
+        volume += float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6
+    assert volume > 0
+
+
+def test_the_files_own_materials_and_their_replacement(folder: Path) -> None:
+    own = load(folder, '[[mesh]]\nfile = "vase.obj"\n')
+    assert [mesh.material.diffuse for mesh in own.meshes] == [(0.1, 0.2, 0.3), (0.4, 0.5, 0.6)]
+    text = '[materials.wood]\ndiffuse_texture = "wood.png"\n[[mesh]]\nfile = "vase.obj"\nmaterial = { Lid = "wood" }\n'
+    replaced = load(folder, text)
+    assert [mesh.material.name for mesh in replaced.meshes] == ["Body", "wood"]
+    texture = replaced.meshes[1].material.diffuse_texture
+    assert texture is not None
+    np.testing.assert_array_equal(texture.pixels[0, 0], [10, 20, 30])
+    assert replaced.meshes[1].material.diffuse == (1.0, 1.0, 1.0)
+
+
+def test_a_file_placed_twice_is_read_once(folder: Path) -> None:
+    scene = load(folder, '[[mesh]]\nfile = "vase.obj"\n[[mesh]]\nfile = "vase.obj"\ncasts_shadows = false\n')
+    assert [mesh.casts_shadows for mesh in scene.meshes] == [True, True, False, False]
+    assert scene.meshes[0].faces is scene.meshes[2].faces
+
+
+def test_what_is_left_out_is_framed(folder: Path) -> None:
+    scene = load(folder, '[[mesh]]\nfile = "vase.obj"\n')
+    framed = frame_meshes(scene.meshes, "vase")
+    assert scene.camera == framed.camera
+    assert scene.lights == framed.lights
+    assert scene.surroundings is STUDIO
+
+
+def test_what_is_given_is_taken(folder: Path) -> None:
+    scene = load(folder, "light = []\n[surroundings]\n[[sphere]]\ncenter = [0, 0, 0]\nradius = 1\n")
+    assert scene.lights == ()
+    assert scene.surroundings == Surroundings()
+    assert scene.spheres[0].material is DEFAULT_MATERIAL
+    only_camera = load(folder, "light = []\n[camera]\nposition = [0, 0, 1]\nlook_at = [0, 0, 0]\n")
+    assert only_camera.meshes == ()
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("title = 3", "vase/scene.toml: title: expected text, found 3"),
+        ("exposure = 0", "vase/scene.toml: exposure: expected a number in (0, 1e+12], found 0"),
+        ("exposure = nan", "vase/scene.toml: exposure: expected a number in (0, 1e+12], found nan"),
+        ("exposure = true", "vase/scene.toml: exposure: expected a number"),
+        ("tilte = 'x'", "vase/scene.toml: tilte: expected one of the fields camera, exposure, light"),
+        ("camera = 1", "vase/scene.toml: camera: expected a table of fields, found 1"),
+        ("[camera]\nposition = [0, 0, 1]", "vase/scene.toml: camera.look_at: expected 3 numbers, found nothing"),
+        ("[camera]\nposition = [0, 0]\nlook_at = [0, 0, 0]", "vase/scene.toml: camera.position: expected 3 numbers"),
+        ("[camera]\nposition = [0, 0, 'x']", "vase/scene.toml: camera.position[2]: expected a number"),
+        (
+            "[camera]\nposition = [0, 0, 1]\nlook_at = [0, 0, 1]",
+            "vase/scene.toml: camera.look_at: expected a point away from camera.position, found (0.0, 0.0, 1.0)",
+        ),
+        (
+            "[camera]\nposition = [0, 0, 1]\nlook_at = [0, 0, 0]\nfov = 3",
+            "vase/scene.toml: camera.fov: expected one of the fields look_at, position, up, vertical_fov_deg, found 3",
+        ),
+        ("[surroundings]\nambient = [1, 2, -3]", "vase/scene.toml: surroundings.ambient[2]: expected a number"),
+        ("mesh = 3", "vase/scene.toml: mesh: expected a list, found 3"),
+        ("[[mesh]]", "vase/scene.toml: mesh[0].file: expected text, found nothing"),
+        ("[[mesh]]\nfile = 'none.obj'", "vase/scene.toml: mesh[0].file: expected an existing file, found no file"),
+        ("[[mesh]]\nfile = '../x.obj'", "vase/scene.toml: mesh[0].file: expected a file inside the folder vase"),
+        ("[[mesh]]\nfile = '/x.obj'", "vase/scene.toml: mesh[0].file: expected a file inside the folder vase"),
+        ("[[mesh]]\nfile = 'wood.png'", "vase/scene.toml: mesh[0].file: expected a mesh file (.obj, .glb"),
+        ("[[mesh]]\nfile = 'vase.obj'\nscale = 0", "vase/scene.toml: mesh[0].scale: expected factors other than 0"),
+        ("[[mesh]]\nfile = 'vase.obj'\nscale = [1, 0, 1]", "vase/scene.toml: mesh[0].scale: expected factors other"),
+        ("[[mesh]]\nfile = 'vase.obj'\nscale = '1'", "vase/scene.toml: mesh[0].scale: expected a number"),
+        ("[[mesh]]\nfile = 'vase.obj'\nrotate_deg = 90", "vase/scene.toml: mesh[0].rotate_deg: expected 3 numbers"),
+        ("[[mesh]]\nfile = 'vase.obj'\nmaterial = 'gold'", "vase/scene.toml: mesh[0].material: expected a material"),
+        (
+            "[materials.red]\n[[mesh]]\nfile = 'vase.obj'\nmaterial = 'gold'",
+            "vase/scene.toml: mesh[0].material: expected one of red, found 'gold'",
+        ),
+        (
+            "[materials.red]\n[[mesh]]\nfile = 'vase.obj'\nmaterial = { Foot = 'red' }",
+            "vase/scene.toml: mesh[0].material: expected materials of the file (Body, Lid), found 'Foot'",
+        ),
+        (
+            "[materials.red]\n[[mesh]]\nfile = 'vase.obj'\nmaterial = { Lid = 'gold' }",
+            "vase/scene.toml: mesh[0].material.Lid: expected one of red, found 'gold'",
+        ),
+        (
+            "[materials.red]\ndiffuse = [2, 0, 0]",
+            "vase/scene.toml: materials.red.diffuse[0]: expected a number in [0, 1]",
+        ),
+        ("[materials.red]\ncolor = 1", "vase/scene.toml: materials.red.color: expected one of the fields diffuse, "),
+        ("[materials.red]\nior = 100", "vase/scene.toml: materials.red.ior: expected a number in [0.1, 10], found 100"),
+        (
+            "[materials.red]\ndiffuse_texture = 'none.png'",
+            "vase/scene.toml: materials.red.diffuse_texture: expected an existing file, found no file 'none.png'",
+        ),
+        ("[materials.red]\ndiffuse_texture = 'vase.obj'", "vase/vase.obj: expected an image that can be read"),
+        ("[[sphere]]\ncenter = [0, 0, 0]", "vase/scene.toml: sphere[0].radius: expected a number, found nothing"),
+        ("[[sphere]]\ncenter = [0, 0, 0]\nradius = 0", "vase/scene.toml: sphere[0].radius: expected a number in (0"),
+        ("[[light]]\nposition = [0, 0, 0]", "vase/scene.toml: light[0].kind: expected one of point, found nothing"),
+        ("[[light]]\nkind = 'sun'", "vase/scene.toml: light[0].kind: expected one of point, found 'sun'"),
+        ("title = 'a\nb'", "vase/scene.toml: expected TOML, found a mistake:"),
+        ("", "vase/scene.toml: expected something to show, found no triangle and no sphere"),
+    ],
+)
+def test_mistakes_are_told_with_their_place(folder: Path, text: str, message: str) -> None:
+    assert refused(folder, text).startswith(message)
+
+
+def test_a_mistake_in_a_mesh_file_names_that_file(folder: Path) -> None:
+    (folder / "vase.obj").write_text("v 0 0 zero\n")
+    assert (
+        refused(folder, "[[mesh]]\nfile = 'vase.obj'")
+        == "vase/vase.obj: line 1: v: expected 3 numbers, found '0 0 zero'"
+    )
+
+
+def test_triangles_of_all_meshes_together_are_limited(folder: Path) -> None:
+    (folder / "scene.toml").write_text("[[mesh]]\nfile = 'vase.obj'\n" * 3)
+    with pytest.raises(SceneError, match=r"mesh\[2\]\.file: expected at most 8 triangles in all, found 12"):
+        load_scene_folder(folder, max_triangles=8)
+
+
+def test_links_out_of_the_folder_are_refused(folder: Path) -> None:
+    outside = folder.parent / "secret.obj"
+    outside.write_text(VASE)
+    (folder / "link.obj").symlink_to(outside)
+    assert "expected a file inside the folder vase" in refused(folder, "[[mesh]]\nfile = 'link.obj'")
+    (folder / "scene.toml").unlink()
+    (folder.parent / "other.toml").write_text("title = 'secret'")
+    (folder / "scene.toml").symlink_to("../other.toml")
+    with pytest.raises(SceneError, match="expected a file inside"):
+        load_scene_folder(folder)
+
+
+def test_no_scene_file(tmp_path: Path) -> None:
+    with pytest.raises(SceneError, match=r"scene\.toml: expected an existing file"):
+        load_scene_folder(tmp_path)
+
+
+def test_damaged_scene_files_give_a_scene_or_an_error(folder: Path) -> None:
+    good = worked_example().encode()
+    generator = np.random.default_rng(6)
+    scenes, messages = 0, []
+    for round_number in range(300):
+        data = bytearray(good[: len(good) * round_number // 100] if round_number < 100 else good)
+        for at in generator.integers(0, max(len(data), 1), 2):
+            if data:
+                data[at] = generator.choice(np.frombuffer(b'0-9.[]="x \n\xff', dtype=np.uint8))
+        (folder / "scene.toml").write_bytes(data)
+        try:
+            load_scene_folder(folder)
+            scenes += 1
+        except SceneError as error:
+            messages.append(str(error))
+    assert scenes > 10
+    assert len(messages) > 10
+    assert not any("\n" in message for message in messages)

@@ -1,0 +1,101 @@
+"""Settings: every field a variable, nothing unsafe by accident."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from pathlib import Path
+
+import pytest
+
+from renderer.errors import SettingsError
+from service.settings import Settings, is_loopback
+
+STATED = {
+    "host": ("0.0.0.0", "0.0.0.0"),
+    "port": ("9000", 9000),
+    "token": ("a-long-token", "a-long-token"),
+    "insecure": ("yes", True),
+    "threads": ("3", 3),
+    "max_pixels": ("1000", 1000),
+    "max_samples_per_cell": ("8", 8),
+    "max_depth": ("2", 2),
+    "max_camera_rays": ("5000", 5000),
+    "max_body_bytes": ("512", 512),
+    "max_concurrent_renders": ("2", 2),
+    "max_queued_renders": ("0", 0),
+    "map_cache_bytes": ("1", 1),
+    "store_bytes": ("2", 2),
+    "scene_bytes": ("3", 3),
+    "allowed_hosts": ("render.example, lab", ("render.example", "lab")),
+    "allowed_origins": ("https://lab.example", ("https://lab.example",)),
+}
+
+
+def test_every_field_has_a_variable(tmp_path: Path) -> None:
+    environ = {f"GAZETRACE_{name.upper()}": text for name, (text, _) in STATED.items()}
+    environ["GAZETRACE_SCENES"] = str(tmp_path)
+    settings = Settings.from_environment(environ)
+    assert {field.name for field in fields(Settings)} == {*STATED, "scenes"}
+    for name, (_, value) in STATED.items():
+        assert getattr(settings, name) == value, name
+    assert settings.scenes == tmp_path
+
+
+def test_empty_and_foreign_variables_state_nothing() -> None:
+    environ = {"GAZETRACE_PORT": "", "GAZETRACE_TOKEN": " ", "GAZETRACE_OTHER": "1", "PORT": "1"}
+    assert Settings.from_environment(environ) == Settings()
+
+
+@pytest.mark.parametrize(
+    ("variable", "text"),
+    [
+        ("GAZETRACE_PORT", "http"),
+        ("GAZETRACE_PORT", "65536"),
+        ("GAZETRACE_PORT", "-1"),
+        ("GAZETRACE_THREADS", "0"),
+        ("GAZETRACE_MAX_PIXELS", "0"),
+        ("GAZETRACE_MAX_SAMPLES_PER_CELL", "4097"),
+        ("GAZETRACE_MAX_DEPTH", "65"),
+        ("GAZETRACE_MAX_CAMERA_RAYS", "1e6"),
+        ("GAZETRACE_MAX_BODY_BYTES", "0"),
+        ("GAZETRACE_MAX_CONCURRENT_RENDERS", "0"),
+        ("GAZETRACE_MAX_QUEUED_RENDERS", "-1"),
+        ("GAZETRACE_STORE_BYTES", "-1"),
+        ("GAZETRACE_INSECURE", "maybe"),
+        ("GAZETRACE_SCENES", "/no/such/folder"),
+        ("GAZETRACE_TOKEN", "short"),
+        ("GAZETRACE_TOKEN", "has a space in it"),
+        ("GAZETRACE_TOKEN", "nicht-für-köpfe"),
+        ("GAZETRACE_ALLOWED_ORIGINS", "lab.example"),
+        ("GAZETRACE_ALLOWED_ORIGINS", "https://lab.example/page"),
+        ("GAZETRACE_HOST", "0.0.0.0"),
+    ],
+)
+def test_a_wrong_variable_is_named(variable: str, text: str) -> None:
+    with pytest.raises(SettingsError) as raised:
+        Settings.from_environment({variable: text})
+    assert raised.value.field == variable
+    assert "\n" not in str(raised.value)
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "127.9.9.9", "::1", "localhost", "LOCALHOST", "localhost."])
+def test_loopback_needs_no_token(host: str) -> None:
+    assert is_loopback(host)
+    assert Settings(host=host).token is None
+
+
+@pytest.mark.parametrize(
+    "host", ["0.0.0.0", "::", "192.168.1.2", "example.org", "127.0.0.1.example.org", "localhost.org"]
+)
+def test_beyond_this_machine_a_token_or_a_word_is_needed(host: str) -> None:
+    with pytest.raises(SettingsError, match="GAZETRACE_TOKEN"):
+        Settings(host=host)
+    assert Settings(host=host, token="a-long-token").host == host
+    assert Settings(host=host, insecure=True).host == host
+
+
+def test_the_token_is_not_shown() -> None:
+    assert "a-long-token" not in repr(Settings(token="a-long-token"))
+    with pytest.raises(SettingsError) as raised:
+        Settings(token="tiny")
+    assert "tiny" not in str(raised.value)
