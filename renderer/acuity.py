@@ -91,9 +91,7 @@ def contrast_threshold(
         return np.asarray(foveal_threshold, dtype=np.float64) * np.exp(exponent)
 
 
-def cut_off_cpd(
-    eccentricity_deg: ArrayLike, model: str = "peli", display_cpd: float = math.inf
-) -> NDArray[np.float64]:
+def cut_off_cpd(eccentricity_deg: ArrayLike, model: str = "peli", display_cpd: float = math.inf) -> NDArray[np.float64]:
     """Highest frequency the eye resolves, f_c = min(display_cpd, E1*E2/(E2+E)) (eq. 2), or another model's.
 
     Args:

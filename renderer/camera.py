@@ -83,4 +83,4 @@ def _direction(start: tuple[float, ...], end: tuple[float, ...]) -> NDArray[np.f
     if largest == 0.0:
         return None
     offset /= largest
-    return offset / np.linalg.norm(offset)  # type: ignore[no-any-return]
+    return offset / np.linalg.norm(offset)

@@ -7,6 +7,7 @@ black, a texture that nothing looks up call for nothing.
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from renderer.scene import BLACK, Material, Scene
@@ -40,15 +41,16 @@ class EffectPlan:
 def plan_effects(scene: Scene) -> EffectPlan:
     """What `scene` calls for, with the reason of each effect."""
     users = _material_users(scene)
+    calls: dict[str, Callable[[Material], bool]] = {
+        "textures": lambda material: material.diffuse_texture is not None and material.diffuse != BLACK,
+        "specular": lambda material: material.specular != BLACK and bool(_lit(scene)),
+        "shadows": lambda material: _takes_light(material) and bool(_shadow_lights(scene)) and _casters(scene) > 0,
+        "reflection": lambda material: material.reflection != BLACK or _is_boundary(material),
+        "refraction": lambda material: material.transmission != BLACK,
+    }
     effects = []
-    for name, calls in (
-        ("textures", lambda material: material.diffuse_texture is not None and material.diffuse != BLACK),
-        ("specular", lambda material: material.specular != BLACK and bool(_lit(scene))),
-        ("shadows", lambda material: _takes_light(material) and bool(_shadow_lights(scene)) and _casters(scene) > 0),
-        ("reflection", lambda material: material.reflection != BLACK or _is_boundary(material)),
-        ("refraction", lambda material: material.transmission != BLACK),
-    ):
-        called_by = [material for material in users if calls(material)]
+    for name, calls_for in calls.items():
+        called_by = [material for material in users if calls_for(material)]
         if called_by:
             effects.append(Effect(name, _reason(name, scene, called_by, users)))
     return EffectPlan(tuple(effects))
@@ -87,9 +89,7 @@ def _is_boundary(material: Material) -> bool:
     return material.transmission != BLACK and material.ior != 1.0
 
 
-def _reason(
-    name: str, scene: Scene, called_by: list[Material], users: dict[Material, Counter[str]]
-) -> str:
+def _reason(name: str, scene: Scene, called_by: list[Material], users: dict[Material, Counter[str]]) -> str:
     if name == "shadows":
         return f"{_count(len(_shadow_lights(scene)), 'light')}, {_count(_casters(scene), 'shadow-casting object')}"
     parts = []

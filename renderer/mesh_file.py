@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import dataclasses
 import io
+import logging
 from pathlib import Path
 from typing import Final
 
@@ -23,6 +24,9 @@ from renderer.gltf_file import read_gltf
 from renderer.obj_file import read_obj
 from renderer.ply_file import read_ply
 from renderer.scene import Mesh
+
+# trimesh logs what it cannot read, traceback and all; it is said once, in our own error.
+logging.getLogger("trimesh").addHandler(logging.NullHandler())
 
 SUFFIXES: Final = (".obj", ".glb", ".gltf", ".ply", ".stl")
 """File name endings of mesh files, in lower case."""

@@ -57,9 +57,7 @@ class Hits(NamedTuple):
 
 def some_rays(rays: Rays, start: int, stop: int) -> Rays:
     """Rays start .. stop - 1, without a copy."""
-    return Rays(
-        rays.origin[start:stop], rays.direction[start:stop], rays.weight[start:stop], rays.sample[start:stop]
-    )
+    return Rays(rays.origin[start:stop], rays.direction[start:stop], rays.weight[start:stop], rays.sample[start:stop])
 
 
 def first_shadow_rays(rays: ShadowRays, count: int) -> ShadowRays:

@@ -99,9 +99,7 @@ def _mean_codes(
 
 
 @kernel
-def _gather_radiance(
-    mask: NDArray[np.int32], means: NDArray[np.float32], radiance: NDArray[np.float32]
-) -> None:
+def _gather_radiance(mask: NDArray[np.int32], means: NDArray[np.float32], radiance: NDArray[np.float32]) -> None:
     for row in range(mask.shape[0]):
         for column in range(mask.shape[1]):
             for channel in range(3):

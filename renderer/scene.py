@@ -45,8 +45,7 @@ class Texture:
     def __post_init__(self) -> None:
         if self.pixels.dtype != np.uint8 or self.pixels.ndim != 3 or self.pixels.shape[2] != 3 or self.pixels.size == 0:
             raise SceneError(
-                f"{self.name}: expected (height, width, 3) uint8 pixels, "
-                f"found {self.pixels.shape} {self.pixels.dtype}"
+                f"{self.name}: expected (height, width, 3) uint8 pixels, found {self.pixels.shape} {self.pixels.dtype}"
             )
 
 
@@ -132,8 +131,7 @@ class Mesh:
         if len(self.faces) and (self.faces.min() < 0 or self.faces.max() >= n):
             bad = int(np.argmax((self.faces < 0).any(axis=1) | (self.faces >= n).any(axis=1)))
             raise SceneError(
-                f"{self.name}: face {bad}: expected vertex indices from 0 to {n - 1}, "
-                f"found {self.faces[bad].tolist()}"
+                f"{self.name}: face {bad}: expected vertex indices from 0 to {n - 1}, found {self.faces[bad].tolist()}"
             )
         _require_bounded(self.name, "vertex", self.vertices)
         if self.normals is not None:

@@ -29,9 +29,7 @@ COUNTERS = 4
 
 
 @formula
-def phong_lobe(
-    s: Surface, lx: float, ly: float, lz: float, vx: float, vy: float, vz: float, shininess: float
-) -> float:
+def phong_lobe(s: Surface, lx: float, ly: float, lz: float, vx: float, vy: float, vz: float, shininess: float) -> float:
     """(R.V)^shininess, R the mirror image of the direction to the light; 0 where R faces away from V.
 
     Args:
@@ -49,9 +47,7 @@ def phong_lobe(
 
 
 @formula
-def _towards(
-    s: Surface, lx: float, ly: float, lz: float
-) -> tuple[float, float, float, float, float, float, float]:
+def _towards(s: Surface, lx: float, ly: float, lz: float) -> tuple[float, float, float, float, float, float, float]:
     """The shadow ray from a surface to a light at (lx, ly, lz): origin, unit direction, and how far to look,
     which is 0 or less if nothing can be in between.
     """
@@ -67,8 +63,15 @@ def _towards(
 
 @formula
 def _light_to_eye(
-    s: Surface, material: Any, kr: float, kg: float, kb: float, light: Any,
-    vx: float, vy: float, vz: float,
+    s: Surface,
+    material: Any,
+    kr: float,
+    kg: float,
+    kb: float,
+    light: Any,
+    vx: float,
+    vy: float,
+    vz: float,
 ) -> tuple[float, float, float]:
     """Radiance that a surface of diffuse albedo (kr, kg, kb) sends towards (vx, vy, vz) of one light,
     nothing being in between; 0 for a light behind the surface or in it.
@@ -234,7 +237,11 @@ def shade(
                 child_origin[n_children, 1] = s.py - s.offset * s.gy
                 child_origin[n_children, 2] = s.pz - s.offset * s.gz
                 rx, ry, rz = _bent(s, eta, cosine, refracted, dx, dy, dz)
-                child_direction[n_children, 0], child_direction[n_children, 1], child_direction[n_children, 2] = rx, ry, rz
+                child_direction[n_children, 0], child_direction[n_children, 1], child_direction[n_children, 2] = (
+                    rx,
+                    ry,
+                    rz,
+                )
                 child_weight[n_children, 0], child_weight[n_children, 1], child_weight[n_children, 2] = tr, tg, tb
                 child_sample[n_children] = sample
                 n_children += 1
@@ -255,9 +262,7 @@ def shade(
 
 
 @kernel
-def add_unblocked(
-    shadows: ShadowRays, blocked: NDArray[np.uint8], radiance: NDArray[np.float32]
-) -> None:
+def add_unblocked(shadows: ShadowRays, blocked: NDArray[np.uint8], radiance: NDArray[np.float32]) -> None:
     """Add the light of the shadow rays that reach it to their samples.
 
     Args:

@@ -124,8 +124,16 @@ def hit_distance(
 
 @formula
 def _box_entry(
-    ox: float, oy: float, oz: float, ix: float, iy: float, iz: float, low: NDArray[np.float64],
-    high: NDArray[np.float64], node: int, limit: float,
+    ox: float,
+    oy: float,
+    oz: float,
+    ix: float,
+    iy: float,
+    iz: float,
+    low: NDArray[np.float64],
+    high: NDArray[np.float64],
+    node: int,
+    limit: float,
 ) -> float:
     """Where a ray enters a node's box, infinity if it misses it or enters beyond `limit`.
 

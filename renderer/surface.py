@@ -64,17 +64,13 @@ def _farther(a: float, b: float, c: float, limit: float) -> float:
 
 
 @formula
-def _lift(
-    px: float, py: float, pz: float, cx: float, cy: float, cz: float, nx: float, ny: float, nz: float
-) -> float:
+def _lift(px: float, py: float, pz: float, cx: float, cy: float, cz: float, nx: float, ny: float, nz: float) -> float:
     """How far below the plane of a corner's normal the point lies, 0 if above (Hanika 2021, ch. 4)."""
     return min(0.0, (px - cx) * nx + (py - cy) * ny + (pz - cz) * nz)
 
 
 @formula
-def triangle_surface(
-    f: NDArray[np.float32], t: int, b1: float, b2: float, dx: float, dy: float, dz: float
-) -> Surface:
+def triangle_surface(f: NDArray[np.float32], t: int, b1: float, b2: float, dx: float, dy: float, dz: float) -> Surface:
     """The surface of facet `t` of the facets `f` at barycentric weights b1, b2 of its second and third corner.
 
     The shadow origin of a smooth triangle is lifted to the curved surface its normals suggest, which
@@ -87,7 +83,7 @@ def triangle_surface(
     px, py, pz = b0 * ax + b1 * bx + b2 * cx, b0 * ay + b1 * by + b2 * cy, b0 * az + b1 * bz + b2 * cz
     ix, iy, iz, jx, jy, jz = bx - ax, by - ay, bz - az, cx - ax, cy - ay, cz - az
     gx, gy, gz = iy * jz - iz * jy, iz * jx - ix * jz, ix * jy - iy * jx
-    entering = gx * dx + gy * dy + gz * dz <= 0.0
+    entering = bool(gx * dx + gy * dy + gz * dz <= 0.0)
     face = 1.0 if entering else -1.0
     inverse = face / math.sqrt(gx * gx + gy * gy + gz * gz)
     gx, gy, gz = gx * inverse, gy * inverse, gz * inverse

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from renderer.kernel import formula
 from renderer.scene import Texture
 
-
 PICTURE = np.dtype([("start", np.int64), ("width", np.int64), ("height", np.int64)])
 """One picture of an atlas: its first texel and its size."""
 

@@ -187,9 +187,7 @@ def _shade_batch(
     """Trace one batch of rays, add what they see, and leave their children on the next level."""
     hits = prepared.intersector.nearest(batch.origin, batch.direction)
     counters = scratch.counters
-    shade(
-        prepared.surfaces, batch, hits, spawn, cutoff, scratch.level(depth + 1), scratch.shadows, radiance, counters
-    )
+    shade(prepared.surfaces, batch, hits, spawn, cutoff, scratch.level(depth + 1), scratch.shadows, radiance, counters)
     pending = int(counters[SHADOWS])
     if pending:
         shadows = first_shadow_rays(scratch.shadows, pending)

@@ -8,6 +8,8 @@ import json
 import math
 import os
 import struct
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -435,6 +437,17 @@ def test_stl_of_several_solids(tmp_path: Path) -> None:
     solid = "solid s\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n"
     (mesh,) = load(tmp_path, "a.stl", (solid + "endsolid s\n") * 3)
     assert len(mesh.faces) == 3
+
+
+def test_stl_with_damaged_face_normals_is_read_in_silence(tmp_path: Path) -> None:
+    text = trimesh.exchange.stl.export_stl_ascii(trimesh.creation.box()).replace("normal", "normal x", 1)
+    (tmp_path / "a.stl").write_text(text)
+    script = (
+        "import sys, pathlib, renderer.mesh_file as m; print(m.load_meshes(pathlib.Path(sys.argv[1]))[0].faces.shape)"
+    )
+    command = [sys.executable, "-c", script, str(tmp_path / "a.stl")]
+    run = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
+    assert (run.stdout.strip(), run.stderr) == ("(12, 3)", "")
 
 
 @pytest.mark.parametrize("data", [b"solid\nendsolid\n", b"\0" * 84, b"\0" * 80 + b"\5\0\0\0" + b"\0" * 100, b"hello"])
