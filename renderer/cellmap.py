@@ -79,7 +79,7 @@ def build_cell_map(kind: str, display: Display, acuity: Acuity, bucket: GazeBuck
 
 
 def cell_sizes(display: Display, acuity: Acuity, bucket: GazeBucket) -> NDArray[np.uint16]:
-    """rho of every pixel: the largest cell side the eye allows there, for every gaze of `bucket`; (h, w) uint16 [px]."""
+    """rho of every pixel, (h, w) uint16 [px]: the largest cell side the eye allows there for any gaze of `bucket`."""
     sizes = np.zeros((display.height_px, display.width_px), dtype=np.uint16)
     fill_cell_sizes(eye_geometry(display, acuity, bucket), 0, sizes)
     return sizes

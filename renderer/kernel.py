@@ -26,7 +26,7 @@ formula = kernel
 """The same for a small function of numbers that kernels call."""
 
 
-def _prefetch(context: Any, rows: Any, row: Any) -> Any:
+def _prefetch(_context: Any, rows: Any, row: Any) -> Any:
     """Ask for the two cache lines at the start of rows[row], a C-contiguous 2-D array, without waiting."""
 
     def generate(target: Any, builder: Any, signature: Any, arguments: Any) -> Any:

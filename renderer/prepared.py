@@ -35,17 +35,18 @@ LIT = 8
 """Bits of what a material calls for."""
 
 
+_COLOURS = [
+    (f"{name}_{channel}", np.float32)
+    for name in ("diffuse", "specular", "emission", "reflection", "transmission")
+    for channel in ("red", "green", "blue")
+]
+
 MATERIAL = np.dtype(
-    [(f"{name}_{channel}", np.float32) for name in ("diffuse", "specular", "emission", "reflection", "transmission")
-     for channel in ("red", "green", "blue")]
-    + [("shininess", np.float32), ("ior", np.float32), ("picture", np.int32), ("calls", np.int32)]
-)  # fmt: skip
+    [*_COLOURS, ("shininess", np.float32), ("ior", np.float32), ("picture", np.int32), ("calls", np.int32)]
+)
 """One material as the kernels read it; `picture` is -1 without a texture, `calls` are the bits above."""
 
-LIGHT = np.dtype(
-    [("x", np.float64), ("y", np.float64), ("z", np.float64)]
-    + [("red", np.float64), ("green", np.float64), ("blue", np.float64), ("casts", np.int64)]
-)
+LIGHT = np.dtype([*((name, np.float64) for name in ("x", "y", "z", "red", "green", "blue")), ("casts", np.int64)])
 """One point light in scene units; `casts` is 1 where shadow rays are to be traced."""
 
 

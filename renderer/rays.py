@@ -27,8 +27,8 @@ class ShadowRays(NamedTuple):
     """Rays towards a light, with what arrives if nothing is in between.
 
     Attributes:
-        origin, direction: (n, 3) float32; directions are of unit length.
-        reach: (n,) float32 distance of the light.
+        origin, direction: (n, 3) float32; directions lead right to the light, in scene units.
+        reach: (n,) float32 where to stop looking, in lengths of the direction: just before 1.
         light: (n, 3) float32 radiance that the sample gains if the light is seen.
         sample: (n,) int32 camera sample of the block.
     """

@@ -47,21 +47,6 @@ def phong_lobe(s: Surface, lx: float, ly: float, lz: float, vx: float, vy: float
 
 
 @formula
-def _towards(s: Surface, lx: float, ly: float, lz: float) -> tuple[float, float, float, float, float, float, float]:
-    """The shadow ray from a surface to a light at (lx, ly, lz): origin, unit direction, and how far to look,
-    which is 0 or less if nothing can be in between.
-    """
-    ox = s.px + s.lift_x + s.gx * s.offset
-    oy = s.py + s.lift_y + s.gy * s.offset
-    oz = s.pz + s.lift_z + s.gz * s.offset
-    dx, dy, dz = lx - ox, ly - oy, lz - oz
-    distance = math.sqrt(dx * dx + dy * dy + dz * dz)
-    reach = distance - OFFSET_ULPS * max(abs(lx), max(abs(ly), abs(lz)))
-    inverse = 1.0 / distance if distance > 0.0 else 0.0
-    return ox, oy, oz, dx * inverse, dy * inverse, dz * inverse, reach
-
-
-@formula
 def _light_to_eye(
     s: Surface,
     material: Any,
@@ -72,19 +57,19 @@ def _light_to_eye(
     vx: float,
     vy: float,
     vz: float,
-) -> tuple[float, float, float]:
+) -> tuple[float, float, float, float]:
     """Radiance that a surface of diffuse albedo (kr, kg, kb) sends towards (vx, vy, vz) of one light,
-    nothing being in between; 0 for a light behind the surface or in it.
+    nothing being in between, and 1 over the light's distance; 0 for a light behind the surface or in it.
     """
     tx, ty, tz = light.x - s.px, light.y - s.py, light.z - s.pz
     square = tx * tx + ty * ty + tz * tz
     if not square > 0.0:
-        return 0.0, 0.0, 0.0
+        return 0.0, 0.0, 0.0, 0.0
     inverse = 1.0 / math.sqrt(square)
     tx, ty, tz = tx * inverse, ty * inverse, tz * inverse
     cosine = tx * s.nx + ty * s.ny + tz * s.nz
     if cosine <= 0.0:
-        return 0.0, 0.0, 0.0
+        return 0.0, 0.0, 0.0, 0.0
     matt = cosine * INVERSE_PI
     red, green, blue = kr * matt, kg * matt, kb * matt
     if material.calls & SPECULAR != 0:
@@ -93,7 +78,7 @@ def _light_to_eye(
         green += material.specular_green * gloss
         blue += material.specular_blue * gloss
     falloff = inverse * inverse
-    return red * (light.red * falloff), green * (light.green * falloff), blue * (light.blue * falloff)
+    return red * (light.red * falloff), green * (light.green * falloff), blue * (light.blue * falloff), inverse
 
 
 @formula
@@ -197,28 +182,31 @@ def shade(
         if material.calls & LIT != 0:
             for index in range(len(lights)):
                 light = lights[index]
-                red, green, blue = _light_to_eye(s, material, kr, kg, kb, light, -dx, -dy, -dz)
+                red, green, blue, inverse = _light_to_eye(s, material, kr, kg, kb, light, -dx, -dy, -dz)
                 red, green, blue = wr * red, wg * green, wb * blue
                 if not max(red, max(green, blue)) > 0.0:
                     continue
-                ox, oy, oz, sx, sy, sz, reach = _towards(s, light.x, light.y, light.z)
-                if light.casts != 0 and reach > 0.0:
-                    shadow_origin[n_shadows, 0] = ox
-                    shadow_origin[n_shadows, 1] = oy
-                    shadow_origin[n_shadows, 2] = oz
-                    shadow_direction[n_shadows, 0] = sx
-                    shadow_direction[n_shadows, 1] = sy
-                    shadow_direction[n_shadows, 2] = sz
-                    shadow_reach[n_shadows] = reach
-                    shadow_light[n_shadows, 0] = red
-                    shadow_light[n_shadows, 1] = green
-                    shadow_light[n_shadows, 2] = blue
-                    shadow_sample[n_shadows] = sample
-                    n_shadows += 1
-                else:
+                reach = 1.0 - OFFSET_ULPS * inverse * max(abs(light.x), max(abs(light.y), abs(light.z)))
+                if light.casts == 0 or not reach > 0.0:
                     radiance[sample, 0] += red
                     radiance[sample, 1] += green
                     radiance[sample, 2] += blue
+                    continue
+                ox = s.px + s.lift_x + s.gx * s.offset
+                oy = s.py + s.lift_y + s.gy * s.offset
+                oz = s.pz + s.lift_z + s.gz * s.offset
+                shadow_origin[n_shadows, 0] = ox
+                shadow_origin[n_shadows, 1] = oy
+                shadow_origin[n_shadows, 2] = oz
+                shadow_direction[n_shadows, 0] = light.x - ox
+                shadow_direction[n_shadows, 1] = light.y - oy
+                shadow_direction[n_shadows, 2] = light.z - oz
+                shadow_reach[n_shadows] = reach
+                shadow_light[n_shadows, 0] = red
+                shadow_light[n_shadows, 1] = green
+                shadow_light[n_shadows, 2] = blue
+                shadow_sample[n_shadows] = sample
+                n_shadows += 1
         if not spawn or material.calls & (MIRROR | BOUNDARY) == 0:
             continue
         mr, mg, mb = float(material.reflection_red), float(material.reflection_green), float(material.reflection_blue)
@@ -252,7 +240,9 @@ def shade(
             child_origin[n_children, 1] = s.py + s.offset * s.gy
             child_origin[n_children, 2] = s.pz + s.offset * s.gz
             rx, ry, rz = _mirrored(s, dx, dy, dz)
-            child_direction[n_children, 0], child_direction[n_children, 1], child_direction[n_children, 2] = rx, ry, rz
+            child_direction[n_children, 0] = rx
+            child_direction[n_children, 1] = ry
+            child_direction[n_children, 2] = rz
             child_weight[n_children, 0], child_weight[n_children, 1], child_weight[n_children, 2] = mr, mg, mb
             child_sample[n_children] = sample
             n_children += 1

@@ -182,7 +182,7 @@ def nearest_spheres(
         best = np.float64(distance[ray]) if primitive[ray] >= 0 else math.inf
         found = -1
         stack[0] = 0
-        depth = 1
+        depth = min(1, len(radii))
         while depth > 0:
             depth -= 1
             node = stack[depth]
@@ -232,7 +232,7 @@ def shade_spheres(
         ix, iy, iz = 1.0 / dx, 1.0 / dy, 1.0 / dz
         limit = np.float64(reach[ray])
         stack[0] = 0
-        depth = 1
+        depth = min(1, len(radii))
         while depth > 0 and blocked[ray] == 0:
             depth -= 1
             node = stack[depth]

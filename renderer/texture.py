@@ -21,12 +21,12 @@ class TextureAtlas(NamedTuple):
         texels: (n,) uint32 sRGB codes, red | green << 8 | blue << 16, row by row, row 0 of each picture
             at the top.
         pictures: (k,) PICTURE.
-        linear: (256,) float32 linear light of each code (IEC 61966-2-1).
+        linear: (256,) float64 linear light of each code (IEC 61966-2-1).
     """
 
     texels: NDArray[np.uint32]
     pictures: NDArray[np.void]
-    linear: NDArray[np.float32]
+    linear: NDArray[np.float64]
 
 
 def srgb_to_linear(coded: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -49,7 +49,7 @@ def build_atlas(textures: list[Texture]) -> TextureAtlas:
     return TextureAtlas(
         texels=np.concatenate(texels) if texels else np.zeros(1, dtype=np.uint32),
         pictures=pictures,
-        linear=srgb_to_linear(np.arange(256) / 255).astype(np.float32),
+        linear=srgb_to_linear(np.arange(256) / 255),
     )
 
 
@@ -67,7 +67,7 @@ def wrap(coordinate: float) -> float:
 
 @formula
 def look_up(
-    texels: NDArray[np.uint32], linear: NDArray[np.float32], start: int, width: int, height: int, u: float, v: float
+    texels: NDArray[np.uint32], linear: NDArray[np.float64], start: int, width: int, height: int, u: float, v: float
 ) -> tuple[float, float, float]:
     """Bilinear linear-light colour at (u, v) of a picture that repeats; texel centres at half-integers, v up.
 

@@ -45,7 +45,7 @@ PATIENCE_S = 120
 @pytest.fixture(autouse=True)
 def plain_environment(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """No setting of the caller's shell, and a folder of one's own to work in."""
-    for name in [name for name in os.environ if name.startswith("GAZETRACE_")]:
+    for name in [name for name in os.environ if name.startswith(("GAZETRACE_", "PYTHON"))]:
         monkeypatch.delenv(name)
     monkeypatch.setenv("PYTHONPATH", str(ROOT))
     monkeypatch.chdir(tmp_path)
@@ -425,8 +425,9 @@ def test_one_broken_scene_does_not_hide_the_others(capsys: pytest.CaptureFixture
 
 
 def test_bench_compares_a_frame_with_bare_embree(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["bench", "matte", *SMALL, "--repeats", "2", "--json"]) == 0
+    assert main(["bench", "matte", *SMALL, "--repeats", "2", "--threads", "3", "--json"]) == 0
     record = json.loads(capsys.readouterr().out)
+    assert record["threads"] == 3
     assert (record["width"], record["height"], record["samples_per_cell"]) == (96, 54, 1)
     assert record["rays"]["primary"] == record["map"]["cells"] > 0
     figures = {figure["name"]: figure for figure in record["figures"]}

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 from numpy.typing import NDArray
@@ -38,7 +38,7 @@ def pool() -> Iterator[WorkerPool]:
 
 
 @pytest.fixture
-def renderer() -> Iterator[Renderer]:
+def fresh() -> Iterator[Renderer]:
     renderer = Renderer(threads=2)
     yield renderer
     renderer.close()
@@ -131,7 +131,6 @@ def test_a_move_of_the_gaze_renews_few_aligned_cells(move_px: int, new_share: fl
 # A partition of the screen
 
 
-@settings(deadline=None)
 @given(data=st.data(), acuity=acuities(MARGINS), bucket_px=st.sampled_from([0, 1, 16, 100, MAX_BUCKET_PX]))
 def test_aligned_cells_tile_the_screen_with_squares_on_multiples_of_their_sides(
     data: st.DataObject, acuity: Acuity, bucket_px: int, pool: WorkerPool
@@ -154,7 +153,6 @@ def test_aligned_cells_tile_the_screen_with_squares_on_multiples_of_their_sides(
     assert_array_equal(rows - rows % full_widths(cells), cells.y[cells.mask])
 
 
-@settings(deadline=None)
 @given(data=st.data(), acuity=acuities(MARGINS), bucket_px=st.sampled_from([0, 16]))
 def test_scanline_cells_share_the_screen_out(
     data: st.DataObject, acuity: Acuity, bucket_px: int, pool: WorkerPool
@@ -173,7 +171,6 @@ def test_scanline_cells_share_the_screen_out(
     assert (np.maximum(right, down) < full_widths(cells)).all()
 
 
-@settings(deadline=None)
 @given(data=st.data())
 def test_a_full_map_has_a_cell_for_each_pixel(data: st.DataObject, pool: WorkerPool) -> None:
     display = data.draw(displays())
@@ -187,7 +184,6 @@ def test_a_full_map_has_a_cell_for_each_pixel(data: st.DataObject, pool: WorkerP
     assert_array_equal(pixels_of_each(cells), 1)
 
 
-@settings(deadline=None)
 @given(data=st.data(), acuity=acuities(MARGINS), bucket_px=st.sampled_from([0, 16]))
 def test_both_tilings_are_what_their_definitions_say(
     data: st.DataObject, acuity: Acuity, bucket_px: int, pool: WorkerPool
@@ -207,7 +203,6 @@ def test_both_tilings_are_what_their_definitions_say(
 # What the eye allows
 
 
-@settings(deadline=None)
 @given(data=st.data(), acuity=acuities(), bucket_px=st.sampled_from([0, 1, 16, 100, MAX_BUCKET_PX]))
 def test_no_aligned_cell_is_coarser_than_any_gaze_of_its_bucket_allows_at_any_of_its_pixels(
     data: st.DataObject, acuity: Acuity, bucket_px: int, pool: WorkerPool
@@ -221,7 +216,6 @@ def test_no_aligned_cell_is_coarser_than_any_gaze_of_its_bucket_allows_at_any_of
     assert (full_widths(cells) <= allowed * (1 + ROUNDING)).all(), gaze
 
 
-@settings(deadline=None)
 @given(data=st.data(), acuity=acuities())
 def test_no_scanline_cell_is_coarser_than_allowed_where_it_opens(
     data: st.DataObject, acuity: Acuity, pool: WorkerPool
@@ -290,20 +284,20 @@ def test_a_map_is_int32_and_read_only(kind: str, pool: WorkerPool) -> None:
     assert cells.nbytes == 4 * (3 * cells.cells + 64 * 48)
 
 
-def test_gazes_of_a_bucket_share_the_map_and_others_do_not(renderer: Renderer) -> None:
+def test_gazes_of_a_bucket_share_the_map_and_others_do_not(fresh: Renderer) -> None:
     display, quality = Display(160, 90), Quality()
-    first, cached = renderer.cell_map(display, quality, Gaze(8.0, 8.0))
+    first, cached = fresh.cell_map(display, quality, Gaze(8.0, 8.0))
     assert not cached
     for x, y in [(23.9, 8.0), (8.0, 23.9), (16.0, 16.0)]:
-        again, cached = renderer.cell_map(display, quality, Gaze(x, y))
+        again, cached = fresh.cell_map(display, quality, Gaze(x, y))
         assert cached
         assert again is first
-    assert not renderer.cell_map(display, quality, Gaze(24.0, 8.0))[1]
-    assert not renderer.cell_map(display, quality, Gaze(8.0, np.nextafter(8.0, 0.0)))[1]
-    assert (renderer.map_cache.hits, renderer.map_cache.misses) == (3, 3)
+    assert not fresh.cell_map(display, quality, Gaze(24.0, 8.0))[1]
+    assert not fresh.cell_map(display, quality, Gaze(8.0, np.nextafter(8.0, 0.0)))[1]
+    assert (fresh.map_cache.hits, fresh.map_cache.misses) == (3, 3)
 
 
-def test_every_setting_that_shapes_the_map_is_part_of_its_key(renderer: Renderer) -> None:
+def test_every_setting_that_shapes_the_map_is_part_of_its_key(fresh: Renderer) -> None:
     gaze, display, quality = Gaze(70.0, 40.0), Display(160, 90), Quality()
     other_maps = [
         (Display(160, 91), quality),
@@ -318,14 +312,14 @@ def test_every_setting_that_shapes_the_map_is_part_of_its_key(renderer: Renderer
         (display, Quality(acuity=Acuity(margin_deg=1.0))),
     ]
     for other_display, other_quality in [(display, quality), *other_maps]:
-        assert not renderer.cell_map(other_display, other_quality, gaze)[1]
+        assert not fresh.cell_map(other_display, other_quality, gaze)[1]
     for same in (Quality(samples_per_cell=1), Quality(antialiasing="regular"), Quality(max_depth=0)):
-        assert renderer.cell_map(display, same, gaze)[1]
+        assert fresh.cell_map(display, same, gaze)[1]
 
 
-def test_a_full_map_serves_every_gaze(renderer: Renderer) -> None:
+def test_a_full_map_serves_every_gaze(fresh: Renderer) -> None:
     display, quality = Display(160, 90), Quality(map="full")
-    first, _ = renderer.cell_map(display, quality, Gaze(0.0, 0.0))
-    again, cached = renderer.cell_map(display, quality, Gaze(1e30, -5.0))
+    first, _ = fresh.cell_map(display, quality, Gaze(0.0, 0.0))
+    again, cached = fresh.cell_map(display, quality, Gaze(1e30, -5.0))
     assert cached
     assert again is first

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 from numpy.typing import NDArray
@@ -103,7 +103,6 @@ def test_pixels_per_degree_differ_along_and_across_where_pixels_are_not_square()
     assert 1 / angles[51, 50] == pytest.approx(32.3135, abs=1e-4)
 
 
-@settings(deadline=None)
 @given(st.data())
 def test_any_view_agrees_with_longer_arithmetic(data: st.DataObject) -> None:
     display = data.draw(displays(60, 40))
@@ -117,7 +116,6 @@ def test_any_view_agrees_with_longer_arithmetic(data: st.DataObject) -> None:
         )
 
 
-@settings(deadline=None)
 @given(displays(60, 40), st.integers(-4000, 4000), st.integers(-4000, 4000), acuities(st.just(0.5)))
 def test_mirrors_of_the_gaze_mirror_every_bit(display: Display, right: int, down: int, acuity: Acuity) -> None:
     width, height = display.width_px, display.height_px
@@ -138,7 +136,6 @@ def test_an_unknown_kind_is_refused() -> None:
 # Cell size
 
 
-@settings(deadline=None)
 @given(st.data(), acuities(st.just(0.0) | st.floats(0, 90)))
 def test_cell_sizes_are_alpha_over_beta_rounded_down(data: st.DataObject, acuity: Acuity) -> None:
     display = data.draw(displays())
@@ -215,7 +212,6 @@ def test_a_display_of_one_pixel_has_one_cell_size() -> None:
 # One size for a whole bucket of gazes, and for a tracker's error
 
 
-@settings(deadline=None)
 @given(st.data(), acuities())
 def test_a_buckets_cells_are_fine_enough_for_every_gaze_in_it(data: st.DataObject, acuity: Acuity) -> None:
     display = data.draw(displays(120, 90))
@@ -228,7 +224,6 @@ def test_a_buckets_cells_are_fine_enough_for_every_gaze_in_it(data: st.DataObjec
     assert not too_large.any(), (bucket, gaze)
 
 
-@settings(deadline=None)
 @given(st.data(), acuities(st.floats(0.01, 45)), st.floats(0, 1), st.floats(0, 2 * math.pi))
 def test_a_margin_makes_cells_fine_enough_for_every_gaze_within_it(
     data: st.DataObject, acuity: Acuity, part: float, direction: float

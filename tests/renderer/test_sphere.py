@@ -27,7 +27,9 @@ def nearest(tree: SphereTree, origin: Floats, direction: Floats) -> tuple[NDArra
     n = len(origin)
     distance, primitive = np.full(n, np.inf, np.float32), np.full(n, -1, np.int32)
     nearest_spheres(tree, origin.astype(np.float32), direction.astype(np.float32), 0, distance, primitive)
-    return distance, np.where(primitive >= 0, tree.material[np.maximum(primitive, 0)], -1) if n else primitive
+    found = primitive >= 0
+    primitive[found] = tree.material[primitive[found]]
+    return distance, primitive
 
 
 def every_distance(center: Floats, radius: Floats, origin: Floats, direction: Floats) -> Floats:
@@ -39,12 +41,14 @@ def every_distance(center: Floats, radius: Floats, origin: Floats, direction: Fl
 
 
 def extended_distance(origin: Floats, direction: Floats, center: Floats, radius: float) -> NDArray[np.longdouble]:
-    """The textbook formula in extended precision."""
+    """Pythagoras in extended precision: to the point nearest the centre, less half the chord."""
     f = origin.astype(np.longdouble) - center.astype(np.longdouble)
     d = direction.astype(np.longdouble)
-    a, b = (d * d).sum(axis=1), (f * d).sum(axis=1)
-    c = (f * f).sum(axis=1) - np.longdouble(radius) ** 2
-    return np.asarray((-b - np.sqrt(b * b - a * c)) / a)
+    length = np.sqrt((d * d).sum(axis=1))
+    d /= length[:, None]
+    to_middle = -(f * d).sum(axis=1)
+    aside = f + to_middle[:, None] * d
+    return np.asarray((to_middle - np.sqrt(np.longdouble(radius) ** 2 - (aside * aside).sum(axis=1))) / length)
 
 
 def distances(origin: Floats, direction: Floats, center: Floats, radius: float) -> Floats:
@@ -58,7 +62,9 @@ def distances(origin: Floats, direction: Floats, center: Floats, radius: float) 
 
 @pytest.mark.parametrize("ratio", [10.0, 100.0, 1_000.0, 4_100.0, 10_000.0, 100_000.0])
 def test_h20_a_sphere_far_away_keeps_its_shape(ratio: float) -> None:
-    """Rays aimed at points within 0.999 radii of the centre all hit, at the right distance."""
+    """Rays that pass within 0.999 radii of the centre all hit, at the right distance: to 64 steps of float64,
+    since the outline is 22 times steeper than the middle.
+    """
     rng = np.random.default_rng(20)
     toward = rng.normal(size=(2000, 3))
     toward /= np.linalg.norm(toward, axis=1)[:, None]
@@ -71,13 +77,14 @@ def test_h20_a_sphere_far_away_keeps_its_shape(ratio: float) -> None:
     assert sound.sum() > (1900 if ratio <= 10_000 else 1000)
     found = distances(origin[sound], direction[sound], np.zeros(3), 1.0)
     truth = extended_distance(origin[sound], direction[sound], np.zeros(3), 1.0)
-    assert np.abs(found - truth).max() <= 16 * np.spacing(ratio)
+    assert np.abs(found - truth).max() <= 64 * np.spacing(ratio)
 
 
 def test_h21_a_sphere_as_large_as_the_ground() -> None:
     rng = np.random.default_rng(21)
-    direction = rng.normal(size=(2000, 3)).astype(np.float32).astype(np.float64)
+    direction = rng.normal(size=(2000, 3))
     direction[:, 1] = -np.abs(direction[:, 1]) - 0.05
+    direction = direction.astype(np.float32).astype(np.float64)
     origin = np.tile((0.0, 1.0, 0.0), (2000, 1))
     center = np.array((0.0, -1e6, 0.0))
     truth = extended_distance(origin, direction, center, 1e6)
