@@ -8,6 +8,7 @@ import re
 import shlex
 import subprocess
 import sys
+import threading
 from collections.abc import Iterator
 from dataclasses import fields
 from pathlib import Path
@@ -145,12 +146,15 @@ def address() -> Iterator[str]:
     environ = {name: value for name, value in os.environ.items() if not name.startswith(VARIABLE_PREFIX)}
     words = [sys.executable, "-m", "clients.command_line", "serve", "--port", "0"]
     with subprocess.Popen(words, cwd=ROOT, env=environ, stdout=subprocess.PIPE, text=True) as process:
+        end_of_patience = threading.Timer(PATIENCE_S, process.kill)
+        end_of_patience.start()
         assert process.stdout is not None
         said = ""
         while not re.search(r"^ready in", said, re.MULTILINE):
             line = process.stdout.readline()
             assert line, said
             said += line
+        end_of_patience.cancel()
         found = re.search(r"http://[\d.]+:\d+", said)
         assert found is not None
         yield found[0]

@@ -468,7 +468,10 @@ def test_a_flag_wins_over_the_environment_and_errors_name_who_said_it() -> None:
 def service() -> Iterator[subprocess.Popen[bytes]]:
     """A running service on a free port."""
     process = start("serve", "--port", "0", stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    end_of_patience = threading.Timer(PATIENCE_S, process.kill)
+    end_of_patience.start()
     yield process
+    end_of_patience.cancel()
     process.kill()
     process.communicate()
 

@@ -83,9 +83,11 @@ def test_an_unknown_parameter_is_named(client: httpx.Client, path: str) -> None:
 
 
 def test_every_wrong_field_is_named(client: httpx.Client) -> None:
-    body = {"scene": "spheres", "gaze": {"x": "a", "y": None}, "blur": 1}
-    problem = expect_problem(post(client, json.dumps(body)), 422, "invalid-request", "gaze.x", "gaze.y", "blur")
+    body = {"gaze": {"x": "a", "y": None}, "blur": 1}
+    fields = ("scene", "gaze.x", "gaze.y", "blur")
+    problem = expect_problem(post(client, json.dumps(body)), 422, "invalid-request", *fields)
     assert [error["message"] for error in problem["errors"]] == [
+        "is required",
         "expected a valid number, found 'a'",
         "expected a valid number, found None",
         "there is no such field",

@@ -13,7 +13,7 @@ from renderer.scenes import BUILT_IN
 from service.settings import Settings
 from tests.service.conftest import BROKEN_SCENE, serving
 
-GAZE = {"gaze_x": 300, "gaze_y": 170, "width_px": 640, "height_px": 360}
+GAZE = {"gaze_x": 300, "gaze_y": 170, "width_px": 640, "height_px": 360, "acuity_scale": 6}
 
 
 def test_all_scenes_are_listed_the_broken_one_with_its_error(client: httpx.Client) -> None:
@@ -52,6 +52,7 @@ def test_a_scene_tells_what_it_holds_and_calls_for(client: httpx.Client) -> None
 def test_cells_in_numbers(client: httpx.Client) -> None:
     counts = client.get("/v1/cellmap", params={**GAZE, "samples_per_cell": 8}).json()
     assert counts["pixels"] == 640 * 360
+    assert len(counts["sides"]) > 3
     assert sum(side["cells"] for side in counts["sides"]) == counts["cells"]
     assert sum(side["pixels"] for side in counts["sides"]) == counts["pixels"]
     assert math.isclose(sum(side["share_of_pixels"] for side in counts["sides"]), 1)
