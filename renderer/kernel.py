@@ -6,7 +6,11 @@ breaks finiteness checks and edge tests. Division by zero gives infinity instead
 
 from __future__ import annotations
 
+import os
+import shutil
+import tempfile
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
@@ -14,7 +18,43 @@ from llvmlite import ir
 from numba.core import types
 from numba.extending import intrinsic
 
+from renderer.version import PACKAGE, source_hash
+
 _F = TypeVar("_F", bound=Callable[..., object])
+
+KEPT_VERSIONS = 3
+"""Compiled versions of the renderer that stay on disk."""
+
+
+def _cache_folder() -> Path:
+    """Where this version's compiled kernels are kept: the first of the usual places that can be written.
+
+    numba notices a change of the file a kernel is in, but not of the files whose functions it calls, so
+    every version of the source has a folder of its own.
+    """
+    given = os.environ.get("NUMBA_CACHE_DIR")
+    home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    places = [Path(given)] if given else [PACKAGE / "__pycache__", home / "gazetrace", Path(tempfile.gettempdir())]
+    for place in places:
+        folder = place / f"gazetrace-kernels-{source_hash()}"
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError:
+            continue
+        if os.access(folder, os.W_OK):
+            _forget_old_versions(place)
+            return folder
+    return places[0]
+
+
+def _forget_old_versions(place: Path) -> None:
+    """Leave the newest versions; a process that still runs an old one has its kernels in memory."""
+    versions = sorted(place.glob("gazetrace-kernels-*"), key=lambda folder: folder.stat().st_mtime, reverse=True)
+    for folder in versions[KEPT_VERSIONS:]:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+numba.config.CACHE_DIR = str(_cache_folder())  # type: ignore[attr-defined]
 
 
 def kernel(function: _F) -> _F:

@@ -8,7 +8,6 @@ import re
 from collections import OrderedDict
 from collections.abc import Iterator
 from concurrent.futures import Future
-from functools import cache
 from pathlib import Path
 from threading import Lock
 from typing import Final
@@ -18,6 +17,7 @@ from renderer.prepared import PreparedScene, prepare
 from renderer.scene import Scene
 from renderer.scene_file import SCENE_FILE, load_scene_folder
 from renderer.scenes import BUILT_IN
+from renderer.version import source_hash
 
 SCENE_ID: Final = re.compile(r"[a-z0-9][a-z0-9_-]{0,63}")
 """What the id of a scene looks like, in full; the same is the name of its folder."""
@@ -94,9 +94,9 @@ class SceneLibrary:
         place = self._place(scene_id)
         if place is None:
             if scene_id in BUILT_IN:
-                return _code_version()
+                return source_hash()
             raise UnknownScene(scene_id, self.ids())
-        digest = hashlib.sha256(_code_version().encode())
+        digest = hashlib.sha256(source_hash().encode())
         for line in _listing(place, scene_id):
             digest.update(line.encode("utf-8", "surrogateescape"))
         return digest.hexdigest()[:16]
@@ -164,13 +164,3 @@ def _listing(place: Path, scene_id: str) -> Iterator[str]:
             except OSError:
                 continue
             yield f"{os.path.relpath(path, place)} {found.st_size} {found.st_mtime_ns} {found.st_ctime_ns}\n"
-
-
-@cache
-def _code_version() -> str:
-    """A short text that changes with the renderer's code."""
-    digest = hashlib.sha256()
-    package = Path(__file__).parent
-    for path in sorted(package.rglob("*.py")):
-        digest.update(path.relative_to(package).as_posix().encode() + b"\0" + path.read_bytes())
-    return digest.hexdigest()[:16]

@@ -90,14 +90,17 @@ def triangle_surface(f: NDArray[np.float32], t: int, b1: float, b2: float, dx: f
     nx, ny, nz = gx, gy, gz
     lift_x, lift_y, lift_z = 0.0, 0.0, 0.0
     if f[t, SMOOTH_COLUMN] != 0.0:
-        n0x, n0y, n0z = face * np.float64(f[t, 3]), face * np.float64(f[t, 4]), face * np.float64(f[t, 5])
-        n1x, n1y, n1z = face * np.float64(f[t, 11]), face * np.float64(f[t, 12]), face * np.float64(f[t, 13])
-        n2x, n2y, n2z = face * np.float64(f[t, 19]), face * np.float64(f[t, 20]), face * np.float64(f[t, 21])
+        n0x, n0y, n0z = np.float64(f[t, 3]), np.float64(f[t, 4]), np.float64(f[t, 5])
+        n1x, n1y, n1z = np.float64(f[t, 11]), np.float64(f[t, 12]), np.float64(f[t, 13])
+        n2x, n2y, n2z = np.float64(f[t, 19]), np.float64(f[t, 20]), np.float64(f[t, 21])
         sx, sy, sz = b0 * n0x + b1 * n1x + b2 * n2x, b0 * n0y + b1 * n1y + b2 * n2y, b0 * n0z + b1 * n1z + b2 * n2z
         length = math.sqrt(sx * sx + sy * sy + sz * sz)
+        side = 1.0 if sx * gx + sy * gy + sz * gz >= 0.0 else -1.0
         if length > 0.0:
-            inverse = 1.0 / length
+            inverse = side / length
             nx, ny, nz = sx * inverse, sy * inverse, sz * inverse
+        n0x, n0y, n0z, n1x, n1y, n1z = side * n0x, side * n0y, side * n0z, side * n1x, side * n1y, side * n1z
+        n2x, n2y, n2z = side * n2x, side * n2y, side * n2z
         d0 = b0 * _lift(px, py, pz, ax, ay, az, n0x, n0y, n0z)
         d1 = b1 * _lift(px, py, pz, bx, by, bz, n1x, n1y, n1z)
         d2 = b2 * _lift(px, py, pz, cx, cy, cz, n2x, n2y, n2z)

@@ -224,6 +224,15 @@ def test_a_buckets_cells_are_fine_enough_for_every_gaze_in_it(data: st.DataObjec
     assert not too_large.any(), (bucket, gaze)
 
 
+def test_a_bucket_wider_than_the_eye_is_far_is_fine_enough_too() -> None:
+    display, side = Display(8, 70, 12.0, 438.0, 2.0), 512
+    acuity = Acuity(scale=3.8)
+    parts = np.linspace(-0.5, 0.5, 33) * side
+    allowed = np.minimum.reduce([true_cell_size(display, acuity, Gaze(x, y)) for x in parts for y in parts])
+    sizes = cell_sizes(display, acuity, GazeBucket(0.0, 0.0, side))
+    assert (sizes <= allowed * (1 + ROUNDING)).all()
+
+
 @given(st.data(), acuities(st.floats(0.01, 45)), st.floats(0, 1), st.floats(0, 2 * math.pi))
 def test_a_margin_makes_cells_fine_enough_for_every_gaze_within_it(
     data: st.DataObject, acuity: Acuity, part: float, direction: float
@@ -236,6 +245,17 @@ def test_a_margin_makes_cells_fine_enough_for_every_gaze_within_it(
     allowed = true_cell_size(display, dataclasses.replace(acuity, margin_deg=0.0), other)
     too_large = sizes_at(display, acuity, gaze) > allowed * (1 + ROUNDING)
     assert not too_large.any(), (gaze, other)
+
+
+@pytest.mark.parametrize("kind", ECCENTRICITIES)
+def test_a_margin_of_one_degree_on_the_papers_screen(kind: str) -> None:
+    display = dataclasses.replace(PAPER_SCREEN, width_px=960, height_px=540)
+    gaze, acuity = Gaze(500.0, 250.0), Acuity(eccentricity=kind, scale=4.0)
+    others = [gaze_beside(display, gaze, kind, 1.0, math.tau * turn / 8) for turn in range(8)]
+    allowed = np.minimum.reduce([true_cell_size(display, acuity, other) for other in others if other is not None])
+    sizes = sizes_at(display, dataclasses.replace(acuity, margin_deg=1.0), gaze)
+    assert (sizes <= allowed * (1 + ROUNDING)).all()
+    assert (sizes >= allowed * 0.75 - 1).all()
 
 
 def gaze_beside(display: Display, gaze: Gaze, kind: str, angle_deg: float, direction: float) -> Gaze | None:

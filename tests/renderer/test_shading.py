@@ -1,0 +1,354 @@
+"""What a surface sends to the eye: closed forms, shadows that must and must not be there, normals that disagree."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from renderer.camera import Camera, view_frame
+from renderer.display import Display
+from renderer.pipeline import Renderer
+from renderer.prepared import prepare
+from renderer.scene import Material, Mesh, PointLight, Rgb, Scene, Sphere, Surroundings
+from tests.renderer.drawing import (
+    BLACK,
+    EVERYWHERE_1,
+    WHITE,
+    WHITE_LAMBERT,
+    U,
+    aim,
+    ball_mesh,
+    box,
+    floor,
+    glass,
+    icosphere,
+    lamp,
+    light,
+    mirror,
+    pixel,
+    quad,
+    shoot,
+)
+
+DOWN = aim((0, 3, 0), (0, 0, 0))
+"""Looks straight down at the origin from 3 m."""
+
+
+def moved(mesh: Mesh, factor: float, offset: Rgb = (0, 0, 0)) -> Mesh:
+    return dataclasses.replace(mesh, vertices=factor * mesh.vertices + np.array(offset, dtype=np.float64))
+
+
+# light
+
+
+@pytest.mark.parametrize(("x", "h"), [(0.0, 1.0), (1.0, 1.0), (3.0, 2.0), (4.0, 0.01), (0.0, 4000.0)])
+@pytest.mark.parametrize("casts", [True, False])
+def test_h35_a_light_over_a_plane(renderer: Renderer, x: float, h: float, casts: bool) -> None:
+    kd, intensity = 0.8, 7.0
+    ground = floor(Material(diffuse=(kd,) * 3), casts_shadows=casts)
+    seen = pixel(renderer, Scene(meshes=(ground,), lights=(light(x, h, 0, intensity),), camera=DOWN))
+    assert seen == pytest.approx(kd / math.pi * intensity * h / (x * x + h * h) ** 1.5, rel=8 * U)
+    if x == h == 1.0:
+        assert seen == pytest.approx(0.1125395395 * kd * intensity, rel=8 * U)
+
+
+def test_a_sphere_under_a_light(renderer: Renderer) -> None:
+    scene = Scene(spheres=(Sphere((0, -2, 0), 2.0, WHITE_LAMBERT),), lights=(light(1, 1, 0, 5.0),), camera=DOWN)
+    assert pixel(renderer, scene) == pytest.approx(5 * 0.1125395395, rel=8 * U)
+
+
+def test_light_adds_up_and_keeps_its_colour(renderer: Renderer) -> None:
+    ground = Material(diffuse=(0.5, 0.25, 1.0), emission=(0.125, 0.0, 0.0))
+    one, two = PointLight((0, 2, 0), (4.0, 2.0, 0.0)), PointLight((0, 1, 0), (0.0, 1.0, 3.0))
+    around = Surroundings(ambient=(0.5, 0.5, 0.5))
+    scene = Scene(meshes=(floor(ground),), lights=(one, two), surroundings=around, camera=DOWN)
+    expected = np.array((0.5, 0.25, 1.0)) * (np.array((1.0, 0.5, 0.0)) + (0.0, 1.0, 3.0)) / math.pi
+    expected += np.array((0.125, 0, 0)) + 0.5 * np.array((0.5, 0.25, 1.0))
+    np.testing.assert_allclose(shoot(renderer, scene).pixels[0, 0], expected, rtol=8 * U)
+
+
+@pytest.mark.parametrize(
+    "place", [(1.0, 0.0, 0.0), (1.0, -0.0, 0.0), (1.0, -1e-6, 0.0), (0.0, -2.0, 0.0), (0.0, 0.0, 0.0)]
+)
+def test_h35_in_the_plane_and_behind_it_there_is_no_light(renderer: Renderer, place: Rgb) -> None:
+    scene = Scene(meshes=(floor(WHITE_LAMBERT),), lights=(light(*place, 1e6),), camera=DOWN)
+    assert pixel(renderer, scene) == 0.0
+
+
+def test_h35_a_light_at_the_eye(renderer: Renderer) -> None:
+    scene = Scene(meshes=(floor(WHITE_LAMBERT),), lights=(light(0, 3, 0, 9.0),), camera=DOWN)
+    assert pixel(renderer, scene) == pytest.approx(1 / math.pi, rel=8 * U)
+
+
+@pytest.mark.parametrize("distance", [0.0, 1e-160, 1e-45, 1e-23, 1e-20, 1e-16, 1e-12, 1e-10, 1e-8, 1e-6])
+@pytest.mark.parametrize("solid", ["plane", "sphere", "mesh"])
+def test_h35_a_light_on_a_surface_is_finite(renderer: Renderer, distance: float, solid: str) -> None:
+    scene = Scene(lights=(light(0.0, distance, 0.0, 1.0),), camera=DOWN)
+    if solid == "sphere":
+        scene = dataclasses.replace(scene, spheres=(Sphere((0, -1, 0), 1.0, WHITE_LAMBERT),))
+    else:
+        ground = floor(WHITE_LAMBERT) if solid == "plane" else moved(ball_mesh(WHITE_LAMBERT, 2, True), 1.0, (0, -1, 0))
+        scene = dataclasses.replace(scene, meshes=(ground,))
+    frame = shoot(renderer, scene, 5, 5, samples=4)
+    assert np.isfinite(frame.pixels).all()
+    assert (frame.pixels >= 0).all()
+    assert frame.cost.rejected_samples == 0
+    assert frame.cost.rms_error is not None
+    assert math.isfinite(frame.cost.rms_error)
+
+
+def test_the_brightest_light_leaves_the_stated_error_finite(renderer: Renderer) -> None:
+    scene = Scene(meshes=(floor(WHITE_LAMBERT),), lights=(light(1, 1e-6, 0, 1e24),), camera=DOWN)
+    cost = shoot(renderer, scene, 8, 8, samples=16).cost
+    assert cost.rms_error is not None
+    assert math.isfinite(cost.rms_error)
+    assert cost.rejected_samples == 0
+
+
+def test_h35_a_closed_ball_keeps_its_light_inside(renderer: Renderer) -> None:
+    inside = (light(0.2, 0.1, 0.0, 1e6),)
+    for ball in (
+        Scene(spheres=(Sphere((0, 0, 0), 1.0, WHITE_LAMBERT),), meshes=(floor(WHITE_LAMBERT, -1.5),), lights=inside),
+        Scene(meshes=(ball_mesh(WHITE_LAMBERT, 3, True), floor(WHITE_LAMBERT, -1.5)), lights=inside),
+        Scene(meshes=(box((-1, -1, -1), (1, 1, 1), WHITE_LAMBERT), floor(WHITE_LAMBERT, -1.5)), lights=inside),
+    ):
+        seen = shoot(renderer, ball, 64, 64, camera=Camera((0, 1, 6), (0, 0, 0))).pixels
+        np.testing.assert_array_equal(seen, 0.0)
+
+
+def test_h44_the_unit_sphere_from_inside(renderer: Renderer) -> None:
+    """Light of pi W/sr in the middle: direct light is exactly the albedo, in every direction."""
+    half = Material(diffuse=(0.5, 0.5, 0.5))
+    for casts in (True, False):
+        scene = Scene(spheres=(Sphere((0, 0, 0), 1.0, half, casts),), lights=(light(0, 0, 0, math.pi),))
+        seen = shoot(renderer, scene, 32, 32, camera=Camera((0.3, 0.2, 0.1), (1, 0.5, 0), vertical_fov_deg=120))
+        np.testing.assert_allclose(seen.pixels, 0.5, rtol=4 * U)
+
+
+def test_surroundings_blend_with_height(renderer: Renderer) -> None:
+    sky = Scene(surroundings=Surroundings(zenith=(0, 0, 1), horizon=(1, 0.5, 0)))
+    for up in (-0.7, 0.0, 0.25, 1.0):
+        direction = (math.sqrt(1 - up * up), up, 0.0)
+        high = max(0.0, up)
+        seen = shoot(renderer, sky, camera=aim((0, 0, 0), direction)).pixels[0, 0]
+        np.testing.assert_allclose(seen, (1 - high, 0.5 * (1 - high), high), atol=4 * U)
+
+
+# highlights
+
+
+@pytest.mark.parametrize("exponent", [0.0, 1.0, 10.0, 1e3, 1e6, 1e9])
+@pytest.mark.parametrize("angle", [0.0, 0.01, 1.0, 30.0, 89.0])
+def test_h41_the_highlight_is_a_power_of_the_cosine(renderer: Renderer, exponent: float, angle: float) -> None:
+    """Eye above, light at an angle: R.V is its cosine. Tolerance: the eye's direction to the middle is exact."""
+    ground = floor(Material(diffuse=BLACK, specular=(0.7, 0.7, 0.7), shininess=exponent))
+    x, y = 2 * math.sin(math.radians(angle)), 2 * math.cos(math.radians(angle))
+    seen = pixel(renderer, Scene(meshes=(ground,), lights=(light(x, y, 0, 4.0),), camera=DOWN))
+    expected = 0.7 * math.cos(math.radians(angle)) ** exponent
+    assert seen == pytest.approx(expected, rel=8 * U + 1e-15 * exponent, abs=1e-30)
+    for n, value in ((10.0, 0.99847799), (1e3, 0.8587165), (1e6, 0.0)):
+        if exponent == n and angle == 1.0:
+            assert seen == pytest.approx(0.7 * value, rel=1e-7, abs=1e-30)
+
+
+def test_h41_a_highlight_never_exceeds_its_peak(renderer: Renderer) -> None:
+    shiny = Material(diffuse=BLACK, specular=WHITE, shininess=1e9)
+    scene = Scene(spheres=(Sphere((0, 0, 0), 1.0, shiny),), lights=(light(0, 0, 3, 4.0),), camera=Camera((0, 0, 3)))
+    seen = shoot(renderer, scene, 65, 65).pixels
+    assert np.isfinite(seen).all()
+    assert seen.max() == pytest.approx(1.0, rel=8 * U)
+
+
+def test_a_highlight_lies_where_the_light_is_mirrored(renderer: Renderer) -> None:
+    """Eye and light at 40 degrees on either side; no highlight with both on one side."""
+    ground = floor(Material(diffuse=BLACK, specular=WHITE, shininess=50.0))
+    x, y = 2 * math.sin(math.radians(40)), 2 * math.cos(math.radians(40))
+    camera = aim((x, y, 0), (0, 0, 0))
+    opposite, beside = (
+        pixel(renderer, Scene(meshes=(ground,), lights=(light(s * x, y, 0, 4.0),)), camera=camera) for s in (-1, 1)
+    )
+    assert opposite == pytest.approx(1.0, rel=1e-5)
+    assert beside < 1e-30
+
+
+# shadows
+
+
+def test_what_stands_between_blocks_and_what_stands_behind_does_not(renderer: Renderer) -> None:
+    lit = Scene(meshes=(floor(WHITE_LAMBERT),), lights=(light(2, 2, 0),), camera=DOWN)
+    bright = pixel(renderer, lit)
+    assert bright > 0
+    plate = quad((0.5, 1, -1), (1, 0, 0), (0, 0, 2), WHITE_LAMBERT)
+    for blocker in (plate, moved(ball_mesh(WHITE_LAMBERT, 1), 0.2, (1, 1, 0))):
+        assert pixel(renderer, dataclasses.replace(lit, meshes=(*lit.meshes, blocker))) == 0.0
+        ghost = dataclasses.replace(blocker, casts_shadows=False)
+        assert pixel(renderer, dataclasses.replace(lit, meshes=(*lit.meshes, ghost))) == bright
+        behind = moved(blocker, 1.0, (1.5, 1.5, 0))
+        assert pixel(renderer, dataclasses.replace(lit, meshes=(*lit.meshes, behind))) == bright
+    for place, value in (((1, 1, 0), 0.0), ((2.5, 2.5, 0), bright)):
+        assert pixel(renderer, dataclasses.replace(lit, spheres=(Sphere(place, 0.3, WHITE_LAMBERT),))) == value
+    ghost_ball = Sphere((1, 1, 0), 0.3, WHITE_LAMBERT, casts_shadows=False)
+    assert pixel(renderer, dataclasses.replace(lit, spheres=(ghost_ball,))) == bright
+
+
+def test_a_light_without_shadows_shines_through_everything(renderer: Renderer) -> None:
+    roof = floor(WHITE_LAMBERT, 1.5, 0.5)
+    for casts in (True, False):
+        scene = Scene(
+            meshes=(floor(WHITE_LAMBERT), roof), lights=(light(0, 2, 0, 1.0, casts),), camera=aim((0, 1, 0), (0, 0, 0))
+        )
+        assert pixel(renderer, scene) == pytest.approx(0.0 if casts else 0.25 / math.pi, rel=8 * U)
+
+
+def test_h36_glass_blocks_light_like_any_object(renderer: Renderer) -> None:
+    scene = Scene(
+        meshes=(floor(WHITE_LAMBERT),), spheres=(Sphere((1, 1, 0), 0.3, glass()),), lights=(light(2, 2, 0),), camera=DOWN
+    )
+    assert pixel(renderer, scene) == 0.0
+
+
+@pytest.mark.parametrize("gap", [1e-3, 1e-4])
+def test_h03_a_blocker_just_before_the_light_or_the_floor_blocks(renderer: Renderer, gap: float) -> None:
+    for height in (gap, 2.0 - gap):
+        roof = floor(WHITE_LAMBERT, height, 1.0)
+        camera = aim((0, height / 2, 0), (0, 0, 0))
+        assert pixel(renderer, Scene(meshes=(floor(WHITE_LAMBERT), roof), lights=(light(0, 2, 0),), camera=camera)) == 0
+
+
+@pytest.mark.parametrize("offset", [(0.0, 0.0, 0.0), (1000.0, 1000.0, 1000.0)])
+def test_h03_the_lamp_a_light_hangs_under_takes_no_light_away(renderer: Renderer, offset: Rgb) -> None:
+    """A light in the very plane of a triangle: what it lights is as bright as without the triangle."""
+    place = np.add((0.1, 5.0, -0.2), offset)
+    plate = Mesh(np.array([[-1, 5, -1], [1, 5, -1], [0, 5, 1]]) + offset, np.array([[0, 1, 2]]), lamp())
+    ground = moved(floor(WHITE_LAMBERT), 1.0, offset)
+    camera = Camera(tuple(np.add((0, 4, 0), offset)), tuple(np.array(offset)), (0, 0, 1), 90)
+    lights = (light(*place, 50.0),)
+    bare, under = (
+        shoot(renderer, Scene(meshes=meshes, lights=lights), 64, 64, camera=camera).pixels
+        for meshes in ((ground, dataclasses.replace(plate, casts_shadows=False)), (ground, plate))
+    )
+    np.testing.assert_array_equal(under, bare)
+
+
+SIZES = (1e-3, 1.0, 1e3, 1e6)
+
+
+@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize("away", [0.0, 1e3])
+@pytest.mark.parametrize("kind", ["flat", "smooth", "sphere"])
+def test_h01_a_convex_body_casts_no_shadow_on_itself(renderer: Renderer, size: float, away: float, kind: str) -> None:
+    """The picture is the same whether it casts shadows or not, but where the light only grazes."""
+    offset = (away * size, -away * size, 0.0)
+    camera = Camera(tuple(np.add((0, 0, 5 * size), offset)), offset, vertical_fov_deg=25)
+    lights = (light(*np.add((4 * size, 3 * size, 5 * size), offset), math.pi * 50 * size * size),)
+    pictures = []
+    for casts in (False, True):
+        if kind == "sphere":
+            scene = Scene(spheres=(Sphere(offset, size, WHITE_LAMBERT, casts),), lights=lights)
+        else:
+            mesh = moved(ball_mesh(WHITE_LAMBERT, 3, kind == "smooth", casts), size, offset)
+            scene = Scene(meshes=(mesh,), lights=lights)
+        pictures.append(shoot(renderer, scene, 128, 128, camera=camera).pixels[..., 0])
+    assert (pictures[0] > 0.1).mean() > 0.3
+    grazing = pictures[0] < 1e-5
+    np.testing.assert_array_equal(pictures[1][~grazing], pictures[0][~grazing])
+
+
+def hits_of(mesh: Mesh, camera: Camera, side_px: int) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
+    """Which pixels of a square picture show the mesh, and the unit interpolated normals there."""
+    prepared = prepare(Scene(meshes=(mesh,)))
+    assert prepared.intersector.triangles == len(mesh.faces)
+    assert mesh.normals is not None
+    view = view_frame(camera, Display(side_px, side_px))
+    y, x = np.mgrid[0:side_px, 0:side_px] + 0.5
+    direction = view.corner + x[..., None] * view.step_x + y[..., None] * view.step_y
+    direction = (direction / np.linalg.norm(direction, axis=2, keepdims=True)).astype(np.float32).reshape(-1, 3)
+    position = ((np.array(camera.position) - prepared.center) * prepared.scale).astype(np.float32)
+    hits = prepared.intersector.nearest(np.tile(position, (len(direction), 1)), direction)
+    weights = np.stack([1.0 - hits.u - hits.v, hits.u, hits.v], axis=1)
+    normals = (weights[:, :, None] * mesh.normals[mesh.faces[hits.primitive]]).sum(axis=1)
+    return hits.primitive >= 0, normals / np.linalg.norm(normals, axis=1, keepdims=True)
+
+
+@pytest.mark.parametrize("level", [1, 2, 3, 4])
+@pytest.mark.parametrize("view", [1.2, 2.5, -0.4])
+def test_h23_a_smooth_mesh_has_no_black_triangles(renderer: Renderer, level: int, view: float) -> None:
+    """The shade is the sphere's own max(0, N.L) up to the terminator, on 80 to 5,120 triangles."""
+    toward = np.array((1.0, 2.0, 3.0)) / math.sqrt(14)
+    mesh = ball_mesh(WHITE_LAMBERT, level, smooth=True)
+    camera = Camera((5 * math.sin(view), 0.5, 5 * math.cos(view)), (0, 0, 0), vertical_fov_deg=22)
+    scene = Scene(meshes=(mesh,), lights=(light(*(1e6 * toward), 1e12 * math.pi),), camera=camera)
+    shade = shoot(renderer, scene, 200, 200).pixels[..., 0].ravel()
+    seen, normals = hits_of(mesh, camera, 200)
+    truth = np.maximum(0.0, normals @ toward)
+    lit = seen & (truth > 1e-5)
+    assert lit.sum() > 5000
+    assert (shade[lit] > 0).all()
+    np.testing.assert_allclose(shade[seen], truth[seen], atol=1e-5)
+
+
+# normals that disagree with the geometry
+
+
+def bent_box(bend: float, seed: int) -> Mesh:
+    """A closed box whose triangles have corner normals up to `bend` away from their own."""
+    shape = box((-1, -1, -1), (1, 1, 1), WHITE_LAMBERT)
+    corners = shape.vertices[shape.faces].reshape(-1, 3)
+    faces = np.arange(len(corners)).reshape(-1, 3)
+    own = np.cross(corners[1::3] - corners[::3], corners[2::3] - corners[::3])
+    own /= np.linalg.norm(own, axis=1)[:, None]
+    normals = np.repeat(own, 3, axis=0) + np.random.default_rng(seed).uniform(-bend, bend, (len(corners), 3))
+    return Mesh(corners, faces, WHITE_LAMBERT, normals)
+
+
+@pytest.mark.parametrize("bend", [0.1, 0.5, 3.0])
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_h25_no_light_leaks_into_a_closed_box(renderer: Renderer, bend: float, seed: int) -> None:
+    lights = (light(4, 5, 6, 1e3), light(-3, 0.2, 0.1, 1e3), light(0, -1.5, 0, 1e3))
+    scene = Scene(meshes=(bent_box(bend, seed),), lights=lights)
+    for look_at in ((1, 0.2, 0), (-1, 0, 0.3), (0.1, 1, 0), (0, -1, 0.1)):
+        seen = shoot(renderer, scene, 48, 48, camera=Camera((0, 0, 0), look_at, (0, 0.3, 1), 90)).pixels
+        np.testing.assert_array_equal(seen, 0.0)
+
+
+def test_h25_a_mirror_ray_stays_above_the_face(renderer: Renderer) -> None:
+    """View at 85 degrees, normal bent 3 degrees away from it: the plain mirror ray would dip below the face."""
+    bend, view = math.radians(3), math.radians(85)
+    sheet = quad((-50, -50, 0), (100, 0, 0), (0, 100, 0), mirror())
+    sheet = dataclasses.replace(sheet, normals=np.tile((-math.sin(bend), 0, math.cos(bend)), (4, 1)))
+    below = quad((-50, -50, -1), (100, 0, 0), (0, 100, 0), lamp(5.0))
+    scene = Scene(meshes=(sheet, below), surroundings=EVERYWHERE_1)
+    assert pixel(renderer, scene, camera=aim((math.sin(view), 0, math.cos(view)), (0, 0, 0))) == 1.0
+
+
+def test_h25_normals_that_face_away_from_the_eye_are_finite(renderer: Renderer) -> None:
+    view = math.radians(85)
+    for bend_deg in (-10, -5.000001, -5, -4.999999, 10):
+        bend = math.radians(bend_deg)
+        for material in (WHITE_LAMBERT, mirror(), glass(), Material(specular=WHITE, shininess=100.0)):
+            sheet = quad((-5, -5, 0), (10, 0, 0), (0, 10, 0), material)
+            sheet = dataclasses.replace(sheet, normals=np.tile((math.sin(bend), 0, math.cos(bend)), (4, 1)))
+            scene = Scene(meshes=(sheet,), lights=(light(-1, 0, 0.2),), surroundings=EVERYWHERE_1)
+            frame = shoot(renderer, scene, 9, 9, camera=aim((math.sin(view), 0, math.cos(view)), (0, 0, 0)))
+            assert np.isfinite(frame.pixels).all()
+            assert (frame.pixels >= 0).all()
+            assert frame.cost.rejected_samples == 0
+
+
+def test_the_poles_of_a_ball_are_no_special_place(renderer: Renderer) -> None:
+    for up in (1.0, -1.0):
+        scene = Scene(spheres=(Sphere((0, 0, 0), 1.0, WHITE_LAMBERT),), lights=(light(0, up * 3, 0, math.pi * 4),))
+        assert pixel(renderer, scene, camera=aim((0, up * 3, 0), (0, 0, 0))) == pytest.approx(1.0, rel=8 * U)
+
+
+def test_the_helper_makes_closed_balls() -> None:
+    vertices, faces = icosphere(2)
+    assert len(faces) == 320
+    edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
+    assert (np.unique(edges, axis=0, return_counts=True)[1] == 2).all()
+    outward = np.cross(vertices[faces[:, 1]] - vertices[faces[:, 0]], vertices[faces[:, 2]] - vertices[faces[:, 0]])
+    assert ((outward * vertices[faces].mean(axis=1)).sum(axis=1) > 0).all()
