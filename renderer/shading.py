@@ -192,9 +192,8 @@ def shade(
                     radiance[sample, 1] += green
                     radiance[sample, 2] += blue
                     continue
-                ox = s.px + s.lift_x + s.gx * s.offset
-                oy = s.py + s.lift_y + s.gy * s.offset
-                oz = s.pz + s.lift_z + s.gz * s.offset
+                away = s.offset + s.lift
+                ox, oy, oz = s.px + away * s.gx, s.py + away * s.gy, s.pz + away * s.gz
                 shadow_origin[n_shadows, 0] = ox
                 shadow_origin[n_shadows, 1] = oy
                 shadow_origin[n_shadows, 2] = oz

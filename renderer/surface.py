@@ -34,7 +34,7 @@ class Surface(NamedTuple):
         nx, ny, nz: shading unit normal; near the outline of a smooth mesh it may lean away from the ray.
         u, v: texture coordinates.
         offset: distance along the geometric normal at which a leaving ray starts.
-        lift_x, lift_y, lift_z: shift of the origin of shadow rays on smooth triangles, 0 elsewhere.
+        lift: distance along the geometric normal by which shadow rays of smooth triangles start higher.
         material: row of the material table.
         entering: True where the ray comes from outside.
     """
@@ -51,9 +51,7 @@ class Surface(NamedTuple):
     u: float
     v: float
     offset: float
-    lift_x: float
-    lift_y: float
-    lift_z: float
+    lift: float
     material: int
     entering: bool
 
@@ -73,8 +71,9 @@ def _lift(px: float, py: float, pz: float, cx: float, cy: float, cz: float, nx: 
 def triangle_surface(f: NDArray[np.float32], t: int, b1: float, b2: float, dx: float, dy: float, dz: float) -> Surface:
     """The surface of facet `t` of the facets `f` at barycentric weights b1, b2 of its second and third corner.
 
-    The shadow origin of a smooth triangle is lifted to the curved surface its normals suggest, which
-    removes the black triangles at the shadow terminator (Hanika, Ray Tracing Gems II, 2021, ch. 4).
+    The shadow origin of a smooth triangle is lifted to the height of the curved surface its normals
+    suggest, which removes the black triangles at the shadow terminator (Hanika, Ray Tracing Gems II, 2021,
+    ch. 4); straight up, so that wild normals do not carry it through a neighbouring wall.
     """
     b0 = 1.0 - b1 - b2
     ax, ay, az = np.float64(f[t, 0]), np.float64(f[t, 1]), np.float64(f[t, 2])
@@ -88,7 +87,7 @@ def triangle_surface(f: NDArray[np.float32], t: int, b1: float, b2: float, dx: f
     inverse = face / math.sqrt(gx * gx + gy * gy + gz * gz)
     gx, gy, gz = gx * inverse, gy * inverse, gz * inverse
     nx, ny, nz = gx, gy, gz
-    lift_x, lift_y, lift_z = 0.0, 0.0, 0.0
+    lift = 0.0
     if f[t, SMOOTH_COLUMN] != 0.0:
         n0x, n0y, n0z = np.float64(f[t, 3]), np.float64(f[t, 4]), np.float64(f[t, 5])
         n1x, n1y, n1z = np.float64(f[t, 11]), np.float64(f[t, 12]), np.float64(f[t, 13])
@@ -104,15 +103,15 @@ def triangle_surface(f: NDArray[np.float32], t: int, b1: float, b2: float, dx: f
         d0 = b0 * _lift(px, py, pz, ax, ay, az, n0x, n0y, n0z)
         d1 = b1 * _lift(px, py, pz, bx, by, bz, n1x, n1y, n1z)
         d2 = b2 * _lift(px, py, pz, cx, cy, cz, n2x, n2y, n2z)
-        lift_x = -(d0 * n0x + d1 * n1x + d2 * n2x)
-        lift_y = -(d0 * n0y + d1 * n1y + d2 * n2y)
-        lift_z = -(d0 * n0z + d1 * n1z + d2 * n2z)
+        lift = -d0 * max(0.0, n0x * gx + n0y * gy + n0z * gz)
+        lift -= d1 * max(0.0, n1x * gx + n1y * gy + n1z * gz)
+        lift -= d2 * max(0.0, n2x * gx + n2y * gy + n2z * gz)
     reach = _farther(ax, ay, az, _farther(bx, by, bz, _farther(cx, cy, cz, 0.0)))
     u = b0 * f[t, 6] + b1 * f[t, 14] + b2 * f[t, 22]
     v = b0 * f[t, 7] + b1 * f[t, 15] + b2 * f[t, 23]
     material = int(f[t, MATERIAL_COLUMN])
     return Surface(
-        px, py, pz, gx, gy, gz, nx, ny, nz, u, v, reach * OFFSET_ULPS, lift_x, lift_y, lift_z, material, entering
+        px, py, pz, gx, gy, gz, nx, ny, nz, u, v, reach * OFFSET_ULPS, lift, material, entering
     )
 
 
@@ -136,4 +135,4 @@ def sphere_surface(
     face = 1.0 if entering else -1.0
     nx, ny, nz = nx * face, ny * face, nz * face
     offset = _farther(px, py, pz, 0.0) * OFFSET_ULPS + _farther(cx, cy, cz, radius) * SPHERE_OFFSET
-    return Surface(px, py, pz, nx, ny, nz, nx, ny, nz, u, v, offset, 0.0, 0.0, 0.0, material, entering)
+    return Surface(px, py, pz, nx, ny, nz, nx, ny, nz, u, v, offset, 0.0, material, entering)
