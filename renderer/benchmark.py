@@ -10,6 +10,7 @@ import statistics
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +26,20 @@ from renderer.workers import WorkerPool
 
 GAZE_STEP_PX = 20.0
 """Move of the gaze whose cost is measured [px]."""
+
+
+FRAME = "whole frame"
+BARE = "bare Embree"
+MAP = "cell map"
+TRACE = "trace"
+RECONSTRUCT = "reconstruct"
+MOVED = "after a 20 px gaze move"
+STORED = "everything stored"
+"""What is timed: the frame traced anew with its map cached and without encoding; Embree alone on the same
+rays and as many threads; building the map; the frame's other stages; and the frame with the sample store warm.
+"""
+
+_Result = TypeVar("_Result")
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,21 +112,24 @@ def measure_frame(
     first = renderer.render(replace(prepared, intersector=recorder), request)  # type: ignore[arg-type]
     pool = WorkerPool(renderer.threads)
     moved = replace(request, gaze=Gaze(request.gaze.x + GAZE_STEP_PX, request.gaze.y))
-    times: dict[str, list[float]] = {}
+    times: dict[str, list[float]] = {name: [] for name in (FRAME, BARE, MAP, TRACE, RECONSTRUCT, MOVED, STORED)}
 
-    def timed(name: str, action: Callable[[], object]) -> None:
+    def timed(name: str, action: Callable[[], _Result]) -> _Result:
         began = time.perf_counter()
-        action()
-        times.setdefault(name, []).append(1e3 * (time.perf_counter() - began))
+        result = action()
+        times[name].append(1e3 * (time.perf_counter() - began))
+        return result
 
     renderer.render(prepared, moved)
     for _ in range(repeats):
         renderer.forget_samples()
-        timed("whole frame, map cached, traced anew", lambda: renderer.render(prepared, request))
-        timed("bare Embree, same rays, all cores", lambda: _trace_bare(prepared.intersector, recorder, pool))
-        timed("frame after a gaze move of 20 px", lambda: renderer.render(prepared, moved))
-        timed("frame again, everything stored", lambda: renderer.render(prepared, request))
-        timed("cell map", lambda: _build_map(request, pool))
+        frame = timed(FRAME, lambda: renderer.render(prepared, request))
+        times[TRACE].append(frame.cost.time_ms.trace)
+        times[RECONSTRUCT].append(frame.cost.time_ms.reconstruct)
+        timed(BARE, lambda: _trace_bare(prepared.intersector, recorder, pool))
+        timed(MOVED, lambda: renderer.render(prepared, moved))
+        timed(STORED, lambda: renderer.render(prepared, request))
+        timed(MAP, lambda: _build_map(request, pool))
         tick()
     pool.close()
     return Benchmark(first.cost.cells, first.cost.rays, renderer.threads, _figures(times))
@@ -139,16 +157,12 @@ def _trace_bare(intersector: Intersector, recorder: _RecordingIntersector, pool:
 
 
 def _figures(times: dict[str, list[float]]) -> tuple[Figure, ...]:
-    figures = [
-        Figure(name, statistics.median(series), min(series), max(series), "ms") for name, series in times.items()
-    ]
-    frame = times["whole frame, map cached, traced anew"]
-    for name, label in (
-        ("bare Embree, same rays, all cores", "whole frame / bare Embree"),
-        ("frame after a gaze move of 20 px", "gaze move / whole frame"),
-        ("cell map", "cell map / whole frame"),
-    ):
-        inverse = name.startswith("bare")
-        ratios = [a / b if inverse else b / a for a, b in zip(frame, times[name], strict=True)]
-        figures.append(Figure(label, statistics.median(ratios), min(ratios), max(ratios), "ratio"))
+    figures = [_figure(name, series, "ms") for name, series in times.items()]
+    for part, whole in ((FRAME, BARE), (MAP, BARE), (TRACE, BARE), (RECONSTRUCT, BARE), (MAP, FRAME), (MOVED, FRAME)):
+        ratios = [a / b for a, b in zip(times[part], times[whole], strict=True)]
+        figures.append(_figure(f"{part} / {whole}", ratios, "ratio"))
     return tuple(figures)
+
+
+def _figure(name: str, series: list[float], unit: str) -> Figure:
+    return Figure(name, statistics.median(series), min(series), max(series), unit)

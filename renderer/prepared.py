@@ -27,6 +27,8 @@ FACET = 32
 
 MATERIAL_COLUMN = 24
 SMOOTH_COLUMN = 25
+NORMAL_COLUMN = 26
+REACH_COLUMN = 29
 
 SPECULAR = 1
 MIRROR = 2
@@ -55,8 +57,8 @@ class Surfaces(NamedTuple):
 
     Attributes:
         facets: (m, FACET) float32, one triangle each, in two cache lines: for each of its three corners
-            position, unit normal and texture coordinates, then the row of its material, and 1 where
-            the corner normals are not the triangle's own.
+            position, unit normal and texture coordinates; then the row of its material, 1 where the
+            corner normals are not the triangle's own, its own unit normal, and its largest coordinate.
         spheres: analytic spheres.
         materials: (k,) MATERIAL, each that something visible has.
         lights: (l,) LIGHT, each that shines.
@@ -252,6 +254,8 @@ def _fill_facets(mesh: Mesh, local: NDArray[np.float32], material: int, facets: 
             corners[:, :, 6:8] = mesh.uvs[mesh.faces]
     facets[:, :MATERIAL_COLUMN] = corners.reshape(-1, MATERIAL_COLUMN)
     facets[:, MATERIAL_COLUMN] = material
+    facets[:, NORMAL_COLUMN : NORMAL_COLUMN + 3] = own[:, 0]
+    facets[:, REACH_COLUMN] = np.abs(corners[:, :, :3]).max(axis=(1, 2))
     facets[:, SMOOTH_COLUMN] = np.abs(corners[:, :, 3:6] - own).max(axis=(1, 2)) > FLAT_NORMAL
 
 

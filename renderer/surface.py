@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.kernel import formula
-from renderer.prepared import MATERIAL_COLUMN, SMOOTH_COLUMN
+from renderer.prepared import MATERIAL_COLUMN, NORMAL_COLUMN, REACH_COLUMN, SMOOTH_COLUMN
 from renderer.sphere import hit_distance
 
 OFFSET_ULPS = 16.0 * 2.0**-23
@@ -80,12 +80,14 @@ def triangle_surface(f: NDArray[np.float32], t: int, b1: float, b2: float, dx: f
     bx, by, bz = np.float64(f[t, 8]), np.float64(f[t, 9]), np.float64(f[t, 10])
     cx, cy, cz = np.float64(f[t, 16]), np.float64(f[t, 17]), np.float64(f[t, 18])
     px, py, pz = b0 * ax + b1 * bx + b2 * cx, b0 * ay + b1 * by + b2 * cy, b0 * az + b1 * bz + b2 * cz
-    ix, iy, iz, jx, jy, jz = bx - ax, by - ay, bz - az, cx - ax, cy - ay, cz - az
-    gx, gy, gz = iy * jz - iz * jy, iz * jx - ix * jz, ix * jy - iy * jx
+    gx, gy, gz = (
+        np.float64(f[t, NORMAL_COLUMN]),
+        np.float64(f[t, NORMAL_COLUMN + 1]),
+        np.float64(f[t, NORMAL_COLUMN + 2]),
+    )
     entering = bool(gx * dx + gy * dy + gz * dz <= 0.0)
     face = 1.0 if entering else -1.0
-    inverse = face / math.sqrt(gx * gx + gy * gy + gz * gz)
-    gx, gy, gz = gx * inverse, gy * inverse, gz * inverse
+    gx, gy, gz = gx * face, gy * face, gz * face
     nx, ny, nz = gx, gy, gz
     lift = 0.0
     if f[t, SMOOTH_COLUMN] != 0.0:
@@ -106,13 +108,10 @@ def triangle_surface(f: NDArray[np.float32], t: int, b1: float, b2: float, dx: f
         lift = -d0 * max(0.0, n0x * gx + n0y * gy + n0z * gz)
         lift -= d1 * max(0.0, n1x * gx + n1y * gy + n1z * gz)
         lift -= d2 * max(0.0, n2x * gx + n2y * gy + n2z * gz)
-    reach = _farther(ax, ay, az, _farther(bx, by, bz, _farther(cx, cy, cz, 0.0)))
     u = b0 * f[t, 6] + b1 * f[t, 14] + b2 * f[t, 22]
     v = b0 * f[t, 7] + b1 * f[t, 15] + b2 * f[t, 23]
     material = int(f[t, MATERIAL_COLUMN])
-    return Surface(
-        px, py, pz, gx, gy, gz, nx, ny, nz, u, v, reach * OFFSET_ULPS, lift, material, entering
-    )
+    return Surface(px, py, pz, gx, gy, gz, nx, ny, nz, u, v, f[t, REACH_COLUMN] * OFFSET_ULPS, lift, material, entering)
 
 
 @formula

@@ -59,7 +59,9 @@ def test_the_nearest_hit_is_what_trying_every_triangle_finds(seed: int, triangle
     vertices = rng.uniform(-1, 1, (3 * triangles, 3)).astype(np.float32)
     faces = np.arange(3 * triangles).reshape(-1, 3)
     origin, direction = rays(rng.uniform(-2, 2, (64, 3)), rng.normal(size=(64, 3)))
-    t, u, v = every_crossing(vertices.astype(np.float64)[faces], origin.astype(np.float64), direction.astype(np.float64))
+    t, u, v = every_crossing(
+        vertices.astype(np.float64)[faces], origin.astype(np.float64), direction.astype(np.float64)
+    )
     clear = (np.minimum(np.minimum(np.abs(u), np.abs(v)), np.abs(1 - u - v)) > 1e-4) | ~np.isfinite(u)
     first = np.sort(t, axis=1)
     alone = True if triangles == 1 else (first[:, 1] > first[:, 0] * (1 + 1e-4)) | np.isinf(first[:, 0])

@@ -206,7 +206,10 @@ def test_a_light_without_shadows_shines_through_everything(renderer: Renderer) -
 
 def test_h36_glass_blocks_light_like_any_object(renderer: Renderer) -> None:
     scene = Scene(
-        meshes=(floor(WHITE_LAMBERT),), spheres=(Sphere((1, 1, 0), 0.3, glass()),), lights=(light(2, 2, 0),), camera=DOWN
+        meshes=(floor(WHITE_LAMBERT),),
+        spheres=(Sphere((1, 1, 0), 0.3, glass()),),
+        lights=(light(2, 2, 0),),
+        camera=DOWN,
     )
     assert pixel(renderer, scene) == 0.0
 

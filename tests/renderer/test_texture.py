@@ -118,7 +118,9 @@ def test_every_code_comes_out_of_a_picture_as_it_went_in(renderer: Renderer) -> 
 
 
 def test_texture_multiplies_the_diffuse_colour(renderer: Renderer) -> None:
-    square = quad((-1, -1, 0), (2, 0, 0), (0, 2, 0), Material(diffuse=(0.5, 0.25, 0.0), diffuse_texture=picture([[99]])))
+    square = quad(
+        (-1, -1, 0), (2, 0, 0), (0, 2, 0), Material(diffuse=(0.5, 0.25, 0.0), diffuse_texture=picture([[99]]))
+    )
     scene = Scene(meshes=(square,), surroundings=AMBIENT, camera=aim((0, 0, 2), (0, 0, 0)))
     expected = np.array([0.5, 0.25, 0.0]) * linear(99)
     np.testing.assert_allclose(shoot(renderer, scene).pixels[0, 0], expected, rtol=4 * U)

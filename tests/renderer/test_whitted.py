@@ -49,9 +49,7 @@ def moved(scene: Scene, factor: float, offset: Rgb) -> Scene:
     return dataclasses.replace(
         scene,
         meshes=tuple(dataclasses.replace(m, vertices=m.vertices * factor + np.array(offset)) for m in scene.meshes),
-        spheres=tuple(
-            dataclasses.replace(s, center=place(s.center), radius=s.radius * factor) for s in scene.spheres
-        ),
+        spheres=tuple(dataclasses.replace(s, center=place(s.center), radius=s.radius * factor) for s in scene.spheres),
         lights=tuple(
             dataclasses.replace(
                 lamp,
@@ -75,7 +73,11 @@ def everything() -> Scene:
     ball = ball_mesh(Material("shiny", diffuse=(0.2, 0.4, 0.7), specular=(0.5,) * 3, reflection=(0.2,) * 3), 2, True)
     vertices = np.round((0.375 * ball.vertices + (0.5, 0, -0.25)) * 1024) / 1024
     return Scene(
-        meshes=(ground, dataclasses.replace(ball, vertices=vertices), box((-1.5, -0.5, -1.5), (-1, 0.25, -1), mirror(0.9))),
+        meshes=(
+            ground,
+            dataclasses.replace(ball, vertices=vertices),
+            box((-1.5, -0.5, -1.5), (-1, 0.25, -1), mirror(0.9)),
+        ),
         spheres=(Sphere((-0.375, 0, 0.25), 0.375, glass()), Sphere((0.125, -0.25, 0.75), 0.25, mirror(0.8))),
         lights=(PointLight((1, 2, 1.5), (9e-8, 7e-8, 5e-8)), PointLight((-1.5, 1, 1), (2e-8, 3e-8, 4e-8))),
         surroundings=Surroundings((1e-9, 2e-9, 4e-9), (3e-9, 3e-9, 2e-9), (5e-10, 5e-10, 5e-10)),
@@ -120,7 +122,7 @@ def test_depth_counts_what_a_ray_may_meet(renderer: Renderer, depth: int) -> Non
     """A lamp seen in a mirror that is seen in a mirror needs depth 2."""
     periscope = (
         quad((-1, -1, -1), (2, 0, 0), (0, math.sqrt(2), -math.sqrt(2)), mirror()),
-        quad((-1, 9, -1), (2, 0, 0), (0, math.sqrt(2), math.sqrt(2)), mirror()),
+        quad((-1, 9, -1 - math.sqrt(2)), (2, 0, 0), (0, math.sqrt(2), math.sqrt(2)), mirror()),
         quad((-1, 8, 5), (2, 0, 0), (0, 4, 0), lamp()),
     )
     middle = -1 + math.sqrt(0.5)
@@ -157,9 +159,7 @@ SLAB = box((-50, -1, -50), (50, 0, 50), glass())
 ABOVE, BELOW = Surroundings(zenith=WHITE), Surroundings(horizon=WHITE)
 
 
-@pytest.mark.parametrize(
-    ("depth", "through"), [(2, 0.9216), (4, 0.92307456), (6, 0.923076919), (20, 12 / 13)]
-)
+@pytest.mark.parametrize(("depth", "through"), [(2, 0.9216), (4, 0.92307456), (6, 0.923076919), (20, 12 / 13)])
 def test_h31_a_glass_slab_lets_12_of_13_through(renderer: Renderer, depth: int, through: float) -> None:
     """Looked at from above: what is reflected sees the zenith, what goes through the horizon."""
     camera = aim((0.3, 4, 0.2), (0.3, 0, 0.2))
@@ -192,17 +192,20 @@ def test_h31_a_ray_leaves_a_slab_as_it_came(renderer: Renderer, angle: float) ->
 
 @pytest.mark.parametrize(("angle", "shift"), [(45.0, 0.3291423082), (60.0, 0.5124720132)])
 def test_h31_a_slab_moves_a_ray_sideways(renderer: Renderer, angle: float, shift: float) -> None:
-    """Found by halving: where the edge of a lamp behind the slab must be to be just seen."""
+    """Found by halving: where the edge of a lamp behind the slab must be to be just seen. Tolerance: rays start
+    16 units in the last place of the largest coordinate, 6 m, off the two faces.
+    """
+    slab = box((-4, -1, -4), (4, 0, 4), glass())
     sine, cosine = math.sin(math.radians(angle)), math.cos(math.radians(angle))
     camera = aim((-3 * sine, 3 * cosine, 0), (0, 0, 0))
     unshifted = 3 * sine / cosine
     low, high = unshifted - 2.0, unshifted
     for _ in range(20):
         edge = (low + high) / 2
-        screen = quad((-40, -3, 5), (40 + edge, 0, 0), (0, 0, -10), lamp(), casts_shadows=False)
-        lit = pixel(renderer, Scene(meshes=(SLAB, screen)), depth=2, camera=camera) > 0
+        screen = quad((-6, -3, 4), (6 + edge, 0, 0), (0, 0, -8), lamp())
+        lit = pixel(renderer, Scene(meshes=(slab, screen)), depth=2, camera=camera) > 0
         low, high = (low, edge) if lit else (edge, high)
-    assert (unshifted - low) * cosine == pytest.approx(shift, abs=2e-5)
+    assert (unshifted - low) * cosine == pytest.approx(shift, abs=2 * 16 * 2.0**-23 * 6)
 
 
 @pytest.mark.parametrize(("h", "deviation"), [(0.1, 3.833233496), (0.3, 11.841288182), (0.5, 21.057558731)])
@@ -253,11 +256,10 @@ def test_h33_a_ball_of_the_same_glass_inside_changes_nothing(renderer: Renderer)
     camera = Camera((0, 0.5, 6), (0, 0, 0), vertical_fov_deg=25)
     around = Surroundings(zenith=WHITE, horizon=(0.2, 0.4, 0.1))
     outer, inner = Sphere((0, 0, 0), 1.0, glass()), Sphere((0.1, 0, 0), 0.5, glass(1.0))
-    one = Scene(spheres=(outer,), surroundings=around, exposure=FINE)
+    one = Scene(spheres=(outer,), surroundings=around, exposure=1e3)
     two = dataclasses.replace(one, spheres=(outer, inner))
-    seen = [shoot(renderer, scene, 32, 32, depth=depth, camera=camera).pixels for scene, depth in ((one, 6), (two, 12))]
-    close = np.abs(seen[1] - seen[0]) < 2e-3
-    assert close.mean() > 0.99
+    seen = [shoot(renderer, scene, 32, 32, depth=64, camera=camera).pixels for scene in (one, two)]
+    np.testing.assert_allclose(seen[1], seen[0], atol=1e-4)
 
 
 @pytest.mark.parametrize("eye", [(0.3, 0.4, 6.0), (0.1, 0.2, 0.0)])
@@ -311,7 +313,7 @@ def test_h40_what_is_bright_is_followed_although_its_share_is_small(renderer: Re
         quad((-9, -9, 0), (18, 0, 0), (0, 18, 0), weak),
         quad((9, -9, 4), (-18, 0, 0), (0, 18, 0), weak, casts_shadows=False),
     )
-    target = quad((2.5, -1, 3.9), (-1, 0, 0), (0, 2, 0), lamp(1000.0))
+    target = quad((3.2, -1, 3.9), (-1, 0, 0), (0, 2, 0), lamp(1000.0))
     scene = Scene(meshes=(*corridor, target), camera=Camera((0, 0, 2), (0.4, 0, 0)))
     bounces = [shoot(renderer, scene, depth=depth).pixels[0, 0, 0] for depth in range(6)]
     level = next(depth for depth, seen in enumerate(bounces) if seen > 0)
@@ -346,8 +348,12 @@ def test_h12_faces_in_one_plane_show_one_of_them_always_the_same(renderer: Rende
     y, x = np.mgrid[0 : n + 1, 0 : n + 1]
     vertices = np.stack([x.ravel() - n / 2, y.ravel() - n / 2, 0.0 * x.ravel()], axis=1)
     first = (np.arange(n)[:, None] * (n + 1) + np.arange(n)).ravel()
-    one = np.concatenate([np.stack([first, first + 1, first + n + 2], 1), np.stack([first, first + n + 2, first + n + 1], 1)])
-    two = np.concatenate([np.stack([first, first + 1, first + n + 1], 1), np.stack([first + 1, first + n + 2, first + n + 1], 1)])
+    one = np.concatenate(
+        [np.stack([first, first + 1, first + n + 2], 1), np.stack([first, first + n + 2, first + n + 1], 1)]
+    )
+    two = np.concatenate(
+        [np.stack([first, first + 1, first + n + 1], 1), np.stack([first + 1, first + n + 2, first + n + 1], 1)]
+    )
     two = np.random.default_rng(12).permutation(two)
     red, green = (Material(diffuse=BLACK, emission=colour) for colour in ((1, 0, 0), (0, 1, 0)))
     scene = Scene(meshes=(Mesh(vertices, one, red), Mesh(vertices, two, green)), camera=Camera((0, 0, 30), (0, 0, 0)))
@@ -374,14 +380,12 @@ def russian_dolls(balls: int) -> Scene:
     )
 
 
-def test_small_blocks_give_the_bits_that_large_blocks_give(
-    renderer: Renderer, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Glass in glass at depth 12; no level of one sample holds more rays than the small block."""
+def test_small_blocks_give_the_bits_that_large_blocks_give(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Glass in glass at depth 12; no level of one sample holds more than 270 rays."""
     scene = russian_dolls(4)
     large = shoot(renderer, scene, 24, 18, samples=3, depth=12)
     assert large.cost.rays.total > 40 * large.cost.rays.primary
-    for block in (96, 200, 1000):
+    for block in (300, 500, 1000):
         monkeypatch.setattr(whitted, "BLOCK_RAYS", block)
         renderer.forget_samples()
         small = shoot(renderer, scene, 24, 18, samples=3, depth=12)

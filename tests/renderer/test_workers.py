@@ -197,27 +197,34 @@ def test_closing_lets_the_jobs_that_were_begun_finish() -> None:
     assert not any(member.is_alive() for member in members)
 
 
-def test_a_pool_can_be_closed_without_waiting_for_the_jobs_that_were_begun() -> None:
+def test_a_pool_can_be_closed_without_waiting_for_more_than_the_blocks_in_work() -> None:
     pool = WorkerPool(2)
-    begun, release = threading.Event(), threading.Event()
-    blocks: list[int] = []
+    both_begun, never = threading.Barrier(3), threading.Event()
+    begun: list[int] = []
+    ended: list[int] = []
+    ended_when_told: list[int] = []
 
     def work(block: int) -> None:
-        blocks.append(block)
-        begun.set()
-        assert release.wait(PATIENCE_S)
+        begun.append(block)
+        if block < 2:
+            both_begun.wait(PATIENCE_S)
+        never.wait(TURN_S)
+        ended.append(block)
 
-    with ThreadPoolExecutor(2) as callers:
-        job = callers.submit(pool.run, work, 1000)
-        assert begun.wait(PATIENCE_S)
-        closing = callers.submit(pool.close, abandon=True)
-        while not pool._closed:
-            pass
-        release.set()
-        closing.result(PATIENCE_S)
+    def ask() -> None:
+        try:
+            pool.run(work, LONG)
+        finally:
+            ended_when_told.extend(ended)
+
+    with ThreadPoolExecutor(1) as caller:
+        job = caller.submit(ask)
+        both_begun.wait(PATIENCE_S)
+        pool.close(abandon=True)
         with pytest.raises(RuntimeError, match="closed before the job was done"):
             job.result(PATIENCE_S)
-    assert len(blocks) <= 2
+    assert 2 <= len(begun) < LONG
+    assert sorted(ended_when_told) == sorted(begun)
 
 
 def test_a_closed_pool_takes_no_job() -> None:

@@ -1,0 +1,425 @@
+"""Whole frames: the same bytes whatever happened before, only new cells traced, and costs that add up."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import threading
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from renderer.acuity import Acuity
+from renderer.camera import Camera
+from renderer.display import Display
+from renderer.frame import Frame, FrameRequest
+from renderer.gaze import Gaze
+from renderer.pipeline import Renderer
+from renderer.prepared import PreparedScene, prepare
+from renderer.quality import MAPS, Quality
+from renderer.scene import Material, Mesh, PointLight, Scene, Sphere, Surroundings, Texture
+from renderer.tonemap import encode_srgb
+from tests.renderer.drawing import (
+    BLACK,
+    EVERYWHERE_1,
+    WHITE,
+    WHITE_LAMBERT,
+    ball_mesh,
+    box,
+    floor,
+    glass,
+    lamp,
+    light,
+    mirror,
+    shoot,
+)
+
+SCREEN = Display(96, 64, width_cm=8.0)
+FOVEATED = Quality(acuity=Acuity(scale=16.0), samples_per_cell=3)
+FULL_HD = Display(1920, 1080, 50.0, 35.0, 60.0)
+
+
+def balls() -> Scene:
+    checks = Texture(np.uint8([[[230] * 3, [30] * 3], [[30] * 3, [230] * 3]]))
+    ground = floor(Material("tiles", diffuse_texture=checks), -1.0)
+    return Scene(
+        meshes=(dataclasses.replace(ground, uvs=ground.uvs * 5 if ground.uvs is not None else None),),
+        spheres=(Sphere((-1, 0, 0), 1.0, glass()), Sphere((1, 0, -0.5), 1.0, mirror(0.8))),
+        lights=(light(3, 5, 4, 90.0), light(-4, 3, 2, 40.0)),
+        surroundings=Surroundings((0.3, 0.5, 0.9), (0.7, 0.7, 0.7), (0.05, 0.05, 0.05)),
+        camera=Camera((0, 1, 7), (0, 0, 0)),
+    )
+
+
+@pytest.fixture(scope="module")
+def scene() -> PreparedScene:
+    return prepare(balls())
+
+
+@pytest.fixture(scope="module")
+def matte() -> PreparedScene:
+    """A scene without effects, quick to trace on a whole screen."""
+    return prepare(Scene(meshes=(floor(WHITE_LAMBERT, casts_shadows=False),), surroundings=EVERYWHERE_1))
+
+
+def request(gaze: tuple[float, float], quality: Quality = FOVEATED, display: Display = SCREEN) -> FrameRequest:
+    return FrameRequest(Gaze(*gaze), display, None, quality, linear=True)
+
+
+def test_the_frames_tried_here_have_cells_of_many_sides(renderer: Renderer) -> None:
+    sides = np.unique(renderer.cell_map(SCREEN, FOVEATED, Gaze(20, 20))[0].side)
+    assert len(sides) >= 4
+
+
+@pytest.mark.parametrize("tiling", MAPS)
+@pytest.mark.parametrize("antialiasing", ["stochastic", "regular"])
+def test_h53_threads_change_no_byte(renderer: Renderer, scene: PreparedScene, tiling: str, antialiasing: str) -> None:
+    asked = request((30, 20), dataclasses.replace(FOVEATED, map=tiling, antialiasing=antialiasing))
+    pictures = []
+    for threads in (1, 2, 3, 8):
+        fresh = Renderer(threads=threads)
+        for linear in (True, False):
+            pictures.append(fresh.render(scene, dataclasses.replace(asked, linear=linear)).pixels)
+        fresh.close()
+    for linear, picture in zip([True, False] * 4, pictures, strict=True):
+        np.testing.assert_array_equal(picture, pictures[0 if linear else 1])
+
+
+@pytest.mark.parametrize("tiling", MAPS)
+def test_what_was_rendered_before_changes_no_byte(scene: PreparedScene, tiling: str) -> None:
+    quality = dataclasses.replace(FOVEATED, map=tiling)
+    wanted = request((50, 30), quality)
+    fresh, used = Renderer(threads=2), Renderer(threads=2)
+    truth = fresh.render(scene, wanted)
+    for gaze in ((20, 20), (75, 33), (90, 60), (-40, 500)):
+        used.render(scene, request(gaze, quality))
+        used.render(scene, request(gaze, dataclasses.replace(quality, samples_per_cell=5)))
+        used.render(scene, request(gaze, dataclasses.replace(quality, antialiasing="regular")))
+        used.render(scene, request(gaze, dataclasses.replace(quality, max_depth=1)))
+        used.render(scene, dataclasses.replace(request(gaze, quality), camera=Camera((1, 1, 7), (0, 0, 0))))
+        used.render(scene, request(gaze, dataclasses.replace(quality, acuity=Acuity(scale=3.0))))
+    again = used.render(scene, wanted)
+    np.testing.assert_array_equal(again.pixels, truth.pixels)
+    assert again.cost.rms_error == truth.cost.rms_error
+    assert again.cost.foveal_rms_error == truth.cost.foveal_rms_error
+    if tiling == "aligned":
+        assert again.cost.cells_traced < truth.cost.cells_traced / 2
+    elif tiling == "full":
+        assert again.cost.cells_traced == 0
+    else:
+        assert again.cost.cells_traced == truth.cost.cells_traced
+    fresh.close()
+    used.close()
+
+
+@settings(max_examples=15)
+@given(st.lists(st.tuples(st.floats(-20, 120), st.floats(-20, 90)), min_size=1, max_size=5))
+def test_a_moving_gaze_gives_the_frames_of_fresh_renderers(
+    scene: PreparedScene, gazes: list[tuple[float, float]]
+) -> None:
+    used = Renderer(threads=2)
+    for gaze in gazes:
+        seen = used.render(scene, request(gaze))
+        fresh = Renderer(threads=1)
+        np.testing.assert_array_equal(seen.pixels, fresh.render(scene, request(gaze)).pixels)
+        fresh.close()
+    used.close()
+
+
+def test_without_room_for_samples_the_frames_are_the_same(renderer: Renderer, scene: PreparedScene) -> None:
+    forgetful = Renderer(threads=2, map_cache_bytes=0, store_bytes=0)
+    for _ in range(2):
+        frame = forgetful.render(scene, request((50, 30)))
+        assert frame.cost.cells_traced == frame.cost.cells
+        assert not frame.cost.map_cached
+        np.testing.assert_array_equal(frame.pixels, renderer.render(scene, request((50, 30))).pixels)
+    assert forgetful.store_cache.entries == forgetful.map_cache.entries == 0
+    forgetful.close()
+
+
+def test_after_20_pixels_a_twentieth_of_the_cells_is_new(matte: PreparedScene) -> None:
+    """On 1920x1080, 50x35 cm at 60 cm: 4.9 % without buckets of gaze; the frame is that of a fresh renderer."""
+    quality = Quality(samples_per_cell=1, gaze_bucket_px=0)
+    used = Renderer(threads=2)
+    used.render(matte, request((1000, 500), quality, FULL_HD))
+    moved = used.render(matte, request((1020, 500), quality, FULL_HD))
+    assert 0.02 < moved.cost.cells_traced / moved.cost.cells < 0.08
+    used.forget_samples()
+    fresh = used.render(matte, request((1020, 500), quality, FULL_HD))
+    assert fresh.cost.cells_traced == fresh.cost.cells
+    np.testing.assert_array_equal(fresh.pixels, moved.pixels)
+    used.close()
+
+
+def test_a_resting_gaze_traces_nothing(renderer: Renderer, scene: PreparedScene) -> None:
+    first = renderer.render(scene, request((33, 44)))
+    again = renderer.render(scene, request((33, 44)))
+    assert again.cost.cells_traced == again.cost.rays.total == 0
+    assert again.cost.map_cached
+    np.testing.assert_array_equal(again.pixels, first.pixels)
+
+
+@pytest.mark.parametrize("tiling", MAPS)
+@pytest.mark.parametrize("samples", [1, 2, 7])
+def test_costs_add_up(scene: PreparedScene, tiling: str, samples: int) -> None:
+    fresh = Renderer(threads=2)
+    quality = dataclasses.replace(FOVEATED, map=tiling, samples_per_cell=samples)
+    for gaze in ((20, 20), (40, 20), (40, 20)):
+        frame = fresh.render(scene, request(gaze, quality))
+        cost = frame.cost
+        cells = fresh.cell_map(SCREEN, quality, Gaze(*gaze))[0]
+        assert (cost.map, cost.samples_per_cell, cost.bucket_px) == (tiling, samples, 16)
+        assert cost.cells == cells.cells == cost.cells_traced + cost.cells_reused
+        assert cost.rays.primary == samples * cost.cells_traced
+        assert cost.rays.total == sum(dataclasses.astuple(cost.rays))
+        assert cost.rejected_samples == 0
+        assert cost.effects == ("textures", "shadows", "reflection", "refraction")
+        assert (cost.rms_error is None) == (samples == 1)
+        assert min(dataclasses.astuple(cost.time_ms)) >= 0
+        if tiling == "full":
+            assert cost.cells == SCREEN.pixels
+            assert (cells.side == 1).all()
+    fresh.close()
+
+
+def test_h60_where_the_eye_resolves_every_pixel_the_frame_is_the_full_one(
+    renderer: Renderer, scene: PreparedScene
+) -> None:
+    wide = Display(64, 64, width_cm=100, distance_cm=30)
+    for antialiasing in ("stochastic", "regular"):
+        asked = Quality(samples_per_cell=3, antialiasing=antialiasing)
+        full, *others = (
+            renderer.render(scene, request((32, 32), dataclasses.replace(asked, map=tiling), wide))
+            for tiling in ("full", "aligned", "scanline")
+        )
+        for other in others:
+            assert other.cost.cells == wide.pixels
+            np.testing.assert_array_equal(other.pixels, full.pixels)
+
+
+def test_the_picture_is_the_linear_frame_tone_mapped(renderer: Renderer, scene: PreparedScene) -> None:
+    linear = renderer.render(scene, request((20, 20)))
+    picture = renderer.render(scene, dataclasses.replace(request((20, 20)), linear=False))
+    assert linear.pixels.dtype == np.float32
+    assert picture.pixels.dtype == np.uint8
+    np.testing.assert_array_equal(picture.pixels, encode_srgb(linear.pixels))
+
+
+def test_exposure_brightens_the_picture_and_not_the_linear_frame(renderer: Renderer) -> None:
+    one, four = (dataclasses.replace(balls(), spheres=(), exposure=exposure) for exposure in (1.0, 4.0))
+    linear = shoot(renderer, one, 32, 24).pixels
+    np.testing.assert_array_equal(shoot(renderer, four, 32, 24).pixels, linear)
+    np.testing.assert_array_equal(shoot(renderer, four, 32, 24, linear=False).pixels, encode_srgb(4 * linear))
+
+
+def test_a_cell_is_one_colour(renderer: Renderer, scene: PreparedScene) -> None:
+    frame = renderer.render(scene, request((20, 20)))
+    cells = renderer.cell_map(SCREEN, FOVEATED, Gaze(20, 20))[0]
+    first = np.zeros(cells.cells, np.int64)
+    first[cells.mask.ravel()[::-1]] = np.arange(cells.mask.size)[::-1]
+    np.testing.assert_array_equal(frame.pixels, frame.pixels.reshape(-1, 3)[first[cells.mask]])
+
+
+@pytest.mark.parametrize("samples", [4, 16])
+@pytest.mark.parametrize("tiling", ["full", "aligned"])
+def test_the_stated_error_is_the_error(renderer: Renderer, tiling: str, samples: int) -> None:
+    """Against the frame of 1,024 samples, within a fifth, on a picture of edges everywhere."""
+    checks = Texture(np.uint8([[[255] * 3, [0] * 3], [[0] * 3, [255] * 3]]))
+    ground = floor(Material(diffuse=WHITE, diffuse_texture=checks), 0.0)
+    ground = dataclasses.replace(ground, uvs=ground.uvs * 60 if ground.uvs is not None else None)
+    prepared = prepare(
+        Scene(meshes=(ground,), surroundings=Surroundings(ambient=WHITE), camera=Camera((0, 6, 0.1), (0, 0, 0)))
+    )
+    quality = Quality(map=tiling, acuity=Acuity(scale=8.0))
+    few, many = (
+        renderer.render(prepared, request((48, 32), dataclasses.replace(quality, samples_per_cell=n), SCREEN))
+        for n in (samples, 1024)
+    )
+    weights = np.array((0.2126, 0.7152, 0.0722))
+    error = math.sqrt((((few.pixels - many.pixels) @ weights) ** 2).mean())
+    assert few.cost.rms_error == pytest.approx(error, rel=0.2)
+
+
+def test_a_picture_without_noise_states_none(renderer: Renderer) -> None:
+    frame = shoot(renderer, Scene(surroundings=EVERYWHERE_1), 64, 48, samples=16)
+    assert frame.cost.rms_error == 0.0
+
+
+def test_the_foveal_error_is_that_of_the_cells_around_the_gaze(renderer: Renderer) -> None:
+    """Noise on the left half only: the fovea sees it there and not on the right."""
+    checks = Texture(np.uint8([[[255] * 3, [0] * 3]]))
+    ground = floor(Material(diffuse=WHITE, diffuse_texture=checks), 0.0)
+    assert ground.uvs is not None
+    left = dataclasses.replace(ground, vertices=ground.vertices - (5, 0, 0), uvs=ground.uvs * 300)
+    around = Surroundings(ambient=WHITE)
+    prepared = prepare(Scene(meshes=(left,), surroundings=around, camera=Camera((0, 6, 0.01), (0, 0, 0))))
+    quality = Quality(map="full", samples_per_cell=8)
+    display = Display(96, 64)
+    noisy, calm = (renderer.render(prepared, request(gaze, quality, display)).cost for gaze in ((10, 32), (86, 32)))
+    assert noisy.rms_error == calm.rms_error
+    assert noisy.foveal_rms_error is not None
+    assert calm.foveal_rms_error == 0.0
+    assert noisy.foveal_rms_error > 0.05
+    away = renderer.render(prepared, request((1e7, 0), quality, display)).cost
+    assert away.foveal_rms_error is None
+
+
+def test_many_frames_at_once_are_the_frames_one_by_one(scene: PreparedScene, matte: PreparedScene) -> None:
+    shared, alone = Renderer(threads=2), Renderer(threads=1)
+    asked = [(s, request((10.0 * i, 50 - 5.0 * i), FOVEATED)) for i in range(6) for s in (scene, matte)]
+    frames: list[Frame | None] = [None] * len(asked)
+
+    def render(index: int) -> None:
+        frames[index] = shared.render(*asked[index])
+
+    threads = [threading.Thread(target=render, args=(index,)) for index in range(len(asked))]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    for frame, (prepared, wanted) in zip(frames, asked, strict=True):
+        assert frame is not None
+        np.testing.assert_array_equal(frame.pixels, alone.render(prepared, wanted).pixels)
+    shared.close()
+    alone.close()
+
+
+def test_the_same_view_asked_twice_at_once_is_traced_once(scene: PreparedScene) -> None:
+    shared = Renderer(threads=2)
+    frames: list[Frame] = []
+
+    def render() -> None:
+        frames.append(shared.render(scene, request((60, 20))))
+
+    threads = [threading.Thread(target=render) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert sorted(frame.cost.cells_traced for frame in frames)[:3] == [0, 0, 0]
+    for frame in frames:
+        np.testing.assert_array_equal(frame.pixels, frames[0].pixels)
+    shared.close()
+
+
+def test_the_caches_count(scene: PreparedScene) -> None:
+    fresh = Renderer(threads=2)
+    for gaze in ((20, 20), (20, 20), (60, 20)):
+        fresh.render(scene, request(gaze))
+    assert (fresh.map_cache.misses, fresh.map_cache.hits, fresh.map_cache.entries) == (2, 1, 2)
+    assert (fresh.store_cache.misses, fresh.store_cache.hits, fresh.store_cache.entries) == (1, 2, 1)
+    assert fresh.map_cache.nbytes > 0
+    assert fresh.store_cache.nbytes > 0
+    fresh.forget_samples()
+    assert fresh.store_cache.nbytes == 0
+    fresh.close()
+
+
+@pytest.mark.parametrize("size", [(1, 1), (1, 9), (9, 1), (3, 5), (17, 13)])
+@pytest.mark.parametrize("tiling", MAPS)
+def test_h61_odd_screens(renderer: Renderer, scene: PreparedScene, size: tuple[int, int], tiling: str) -> None:
+    display = Display(*size, width_cm=0.05 * size[0])
+    quality = Quality(map=tiling, samples_per_cell=2, acuity=Acuity(scale=30.0))
+    frame = renderer.render(scene, request((size[0] / 2, 1e6), quality, display))
+    assert frame.pixels.shape == (size[1], size[0], 3)
+    assert np.isfinite(frame.pixels).all()
+    assert frame.cost.cells_traced + frame.cost.cells_reused == frame.cost.cells <= size[0] * size[1]
+
+
+def test_warming_up_leaves_nothing_to_compile() -> None:
+    fresh = Renderer(threads=1)
+    fresh.warm_up()
+    assert fresh.map_cache.entries > 0
+    fresh.close()
+
+
+# any scene gives a finite picture
+
+shares = st.sampled_from([0.0, 0.04, 0.5, 1.0])
+colours = st.tuples(shares, shares, shares)
+brightness = st.sampled_from([0.0, 1e-6, 1.0, 1e6, 1e12])
+positions = st.tuples(*[st.sampled_from([-1.0, -0.5, 0.0, 1e-7, 0.25, 1.0, 3.0])] * 3)
+materials = st.builds(
+    Material,
+    diffuse=colours,
+    specular=colours,
+    shininess=st.sampled_from([0.0, 1.0, 50.0, 1e9]),
+    emission=st.tuples(brightness, brightness, brightness),
+    reflection=colours,
+    transmission=colours,
+    ior=st.sampled_from([0.1, 0.7, 1.0, 1.5, 10.0]),
+    diffuse_texture=st.sampled_from([None, Texture(np.uint8([[[0] * 3, [255] * 3, [9] * 3]]))]),
+)
+spheres = st.builds(
+    Sphere, positions, st.sampled_from([1e-9, 0.25, 0.5, 1.0, 1e3, 1e9]), materials, casts_shadows=st.booleans()
+)
+
+
+@st.composite
+def meshes(draw: st.DrawFn) -> Mesh:
+    """A box, a ball, or loose triangles with wild normals and texture coordinates."""
+    material, casts = draw(materials), draw(st.booleans())
+    kind = draw(st.sampled_from(["box", "ball", "loose"]))
+    if kind == "box":
+        return box((-1, -1, -1), draw(st.sampled_from([(1, 1, 1), (1, -1, 1), (1e-8, 1, 1)])), material, casts)
+    if kind == "ball":
+        return ball_mesh(material, 1, draw(st.booleans()), casts)
+    count = draw(st.integers(1, 6))
+    corners = np.array(draw(st.lists(positions, min_size=3 * count, max_size=3 * count)))
+    wild = st.sampled_from([0.0, 1.0, -1.0, 1e-23, 1e30, math.nan, math.inf])
+    normals = np.array(draw(st.lists(st.tuples(wild, wild, wild), min_size=3 * count, max_size=3 * count)))
+    uvs = np.array(draw(st.lists(st.tuples(wild, wild), min_size=3 * count, max_size=3 * count)))
+    faces = np.arange(3 * count).reshape(-1, 3)
+    return Mesh(corners, faces, material, normals if draw(st.booleans()) else None, uvs, casts)
+
+
+lights_anywhere = st.builds(
+    PointLight, positions, st.tuples(brightness, brightness, brightness), casts_shadows=st.booleans()
+)
+scenes = st.builds(
+    Scene,
+    meshes=st.lists(meshes(), max_size=3).map(tuple),
+    spheres=st.lists(spheres, max_size=4).map(tuple),
+    lights=st.lists(lights_anywhere, max_size=3).map(tuple),
+    surroundings=st.builds(Surroundings, colours, colours, colours),
+    camera=st.builds(
+        Camera, st.sampled_from([(0.0, 0.0, 4.0), (0.0, 0.0, 0.0), (0.25, 1.0, 0.5), (1.0, 1e-7, 1.0), (3e6, 2e6, 1e6)]),
+        st.sampled_from([(0.0, 0.0, -9.0), (-1.0, -0.5, -3.0)]), vertical_fov_deg=st.sampled_from([20.0, 100.0]),
+    ),
+    exposure=st.sampled_from([1e-3, 1.0, 1e3]),
+)  # fmt: skip
+
+
+@settings(max_examples=150)
+@given(scenes, st.sampled_from([0, 3, 6]))
+def test_h50_every_frame_of_every_scene_is_finite(renderer: Renderer, scene: Scene, depth: int) -> None:
+    """Also with lights on and in surfaces, the eye inside things, and materials that make no sense."""
+    frame = shoot(renderer, scene, 12, 9, samples=2, depth=depth)
+    assert np.isfinite(frame.pixels).all()
+    assert (frame.pixels >= 0).all()
+    assert frame.cost.rejected_samples == 0
+    assert frame.cost.rms_error is not None
+    assert math.isfinite(frame.cost.rms_error)
+
+
+def test_h52_a_pixel_at_the_far_end_of_a_huge_screen_is_where_it_should_be(renderer: Renderer) -> None:
+    """16,384 pixels wide: a lamp that covers the right half of the last pixel but one."""
+    width = 16_384
+    camera = Camera((0, 0, 1), (0, 0, 0), vertical_fov_deg=2 * math.degrees(math.atan(1 / width)))
+    edge = (width - 1.5) / (width / 2) - 1
+    plate = Mesh(
+        np.array([[edge, -1, 0], [2, -1, 0], [2, 1, 0], [edge, 1, 0]]), np.array([[0, 1, 2], [0, 2, 3]]), lamp()
+    )
+    frame = shoot(renderer, Scene(meshes=(plate,), camera=camera), width, 1, samples=256)
+    seen = frame.pixels[0, :, 0]
+    assert seen[-1] == 1.0
+    assert seen[-2] == pytest.approx(0.5, abs=0.15)
+    assert (seen[:-2] == 0).all()
+
+
+def test_a_black_scene_is_black(renderer: Renderer) -> None:
+    for scene in (Scene(), Scene(meshes=(floor(Material(diffuse=BLACK)),), lights=(light(0, 3, 0),))):
+        frame = shoot(renderer, scene, 8, 8, linear=False)
+        np.testing.assert_array_equal(frame.pixels, 0)

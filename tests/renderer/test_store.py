@@ -1,0 +1,140 @@
+"""The sample store: a cell has one place whatever the gaze, and sums do not remember how they were gathered."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from renderer.acuity import Acuity
+from renderer.cellmap import CellMap
+from renderer.display import Display
+from renderer.gaze import Gaze
+from renderer.pipeline import Renderer
+from renderer.quality import Quality
+from renderer.store import (
+    BRIGHTEST,
+    LUMINANCE,
+    SampleStore,
+    add_samples,
+    aligned_sides,
+    aligned_slots,
+    missing_cells,
+    slots_needed,
+    slots_of,
+)
+
+NEAR = Display(96, 54, width_cm=5.0)
+COARSE = Acuity(scale=15.0)
+"""A screen and an eye that make cells of many sides."""
+
+
+def cell_map(renderer: Renderer, kind: str, gaze: tuple[float, float], display: Display = NEAR) -> CellMap:
+    return renderer.cell_map(display, Quality(map=kind, acuity=COARSE), Gaze(*gaze))[0]
+
+
+def identities(cells: CellMap) -> list[tuple[int, int, int]]:
+    return list(zip(cells.side.tolist(), cells.x.tolist(), cells.y.tolist(), strict=True))
+
+
+def test_sides_are_powers_of_two_and_three_times_them() -> None:
+    assert aligned_sides(1920, 1080).tolist()[:10] == [1, 2, 3, 4, 6, 8, 12, 16, 24, 32]
+    assert aligned_sides(1920, 1080).max() <= 1080
+    assert aligned_sides(1, 7).tolist() == [1]
+
+
+@settings(max_examples=30)
+@given(st.lists(st.tuples(st.floats(-50, 150), st.floats(-50, 100)), min_size=2, max_size=6))
+def test_a_cell_has_the_same_place_for_every_gaze_and_no_other_cell_has_it(
+    renderer: Renderer, gazes: list[tuple[float, float]]
+) -> None:
+    """Also where squares of one side could begin in the middle of those of another."""
+    cell_of_slot: dict[int, tuple[int, int, int]] = {}
+    for gaze in gazes:
+        cells = cell_map(renderer, "aligned", gaze)
+        slots = slots_of(cells)
+        assert slots.min() >= 0
+        assert slots.max() < slots_needed(cells) == aligned_slots(96, 54)
+        for slot, identity in zip(slots.tolist(), identities(cells), strict=True):
+            assert cell_of_slot.setdefault(slot, identity) == identity
+    assert len(set(cell_of_slot.values())) == len(cell_of_slot)
+
+
+def test_the_maps_tried_here_have_cells_of_many_sides(renderer: Renderer) -> None:
+    sides = [set(cell_map(renderer, "aligned", gaze).side.tolist()) for gaze in ((48, 27), (0, 0), (150, 100))]
+    assert {1, 2, 3, 4, 6, 8} <= set.union(*sides)
+
+
+@pytest.mark.parametrize("size", [(1, 1), (1, 9), (9, 1), (17, 13), (96, 54)])
+def test_full_maps_share_the_places_of_single_pixels(renderer: Renderer, size: tuple[int, int]) -> None:
+    display = Display(*size, width_cm=5.0)
+    cells = cell_map(renderer, "full", (0, 0), display)
+    slots = slots_of(cells)
+    assert len(set(slots.tolist())) == cells.cells == display.pixels
+    aligned = cell_map(renderer, "aligned", (size[0] / 2, size[1] / 2), display)
+    place = {identity: slot for identity, slot in zip(identities(cells), slots.tolist(), strict=True)}
+    for identity, slot in zip(identities(aligned), slots_of(aligned).tolist(), strict=True):
+        assert identity[0] > 1 or place[identity] == slot
+
+
+def test_scanline_cells_have_places_of_their_map_only(renderer: Renderer) -> None:
+    cells = cell_map(renderer, "scanline", (10, 10))
+    np.testing.assert_array_equal(slots_of(cells), np.arange(cells.cells))
+    assert slots_needed(cells) == cells.cells
+
+
+def sample(radiance: NDArray[np.float32], *parts: int) -> SampleStore:
+    """Two cells in slots 5 and 2; `radiance` is (2, n, 3), added in parts of these lengths."""
+    store, slots, cells = SampleStore(7), np.array([5, 2]), np.array([0, 1], np.int32)
+    start = 0
+    for length in parts:
+        part = np.ascontiguousarray(radiance[:, start : start + length]).reshape(-1, 3)
+        assert add_samples(store.samples, slots, cells, part, length) == 0
+        start += length
+    return store
+
+
+def test_sums_do_not_depend_on_the_parts_they_were_added_in() -> None:
+    radiance = np.random.default_rng(0).random((2, 9, 3)).astype(np.float32)
+    at_once, in_parts = sample(radiance, 9), sample(radiance, 1, 3, 5)
+    for one, two in zip(at_once.samples, in_parts.samples, strict=True):
+        np.testing.assert_array_equal(one, two)
+    np.testing.assert_allclose(at_once.samples.total[[5, 2]], radiance.sum(axis=1), rtol=1e-6)
+    luminance = radiance @ np.array(LUMINANCE)
+    np.testing.assert_allclose(at_once.samples.square[[5, 2]], (luminance**2).sum(axis=1), rtol=1e-5)
+    assert at_once.samples.number.tolist() == [0, 0, 9, 0, 0, 9, 0]
+
+
+def test_only_cells_without_their_samples_are_missing() -> None:
+    store = sample(np.ones((2, 4, 3), np.float32), 4)
+    slots, missing = np.array([5, 1, 2, 0]), np.zeros(4, np.int32)
+    assert missing_cells(store.samples, slots, 4, missing) == 2
+    assert missing[:2].tolist() == [1, 3]
+    assert missing_cells(store.samples, slots, 5, missing) == 4
+
+
+@pytest.mark.parametrize("bad", [np.nan, -1e-9, -np.inf])
+@pytest.mark.parametrize("channel", [0, 1, 2])
+def test_h50_a_sample_that_is_no_light_counts_as_black_and_is_counted(bad: float, channel: int) -> None:
+    radiance = np.ones((4, 3), np.float32)
+    radiance[2, channel] = bad
+    store = SampleStore(1)
+    assert add_samples(store.samples, np.array([0]), np.array([0], np.int32), radiance, 4) == 1
+    np.testing.assert_array_equal(store.samples.total[0], 3.0)
+    assert store.samples.number[0] == 4
+    assert np.isfinite(store.samples.square).all()
+
+
+@pytest.mark.parametrize("huge", [np.inf, 3.4e38, 1e30, 1e17])
+def test_h50_endless_light_is_cut_where_its_squares_still_fit(huge: float) -> None:
+    radiance = np.full((4096, 3), huge, np.float32)
+    store = SampleStore(1)
+    assert add_samples(store.samples, np.array([0]), np.array([0], np.int32), radiance, 4096) == 0
+    np.testing.assert_allclose(store.samples.total[0] / 4096, BRIGHTEST, rtol=1e-3)
+    assert np.isfinite(store.samples.square[0])
+
+
+def test_a_store_states_its_size() -> None:
+    assert SampleStore(1000).nbytes == sum(array.nbytes for array in SampleStore(1000).samples)
