@@ -385,7 +385,8 @@ scenes = st.builds(
     lights=st.lists(lights_anywhere, max_size=3).map(tuple),
     surroundings=st.builds(Surroundings, colours, colours, colours),
     camera=st.builds(
-        Camera, st.sampled_from([(0.0, 0.0, 4.0), (0.0, 0.0, 0.0), (0.25, 1.0, 0.5), (1.0, 1e-7, 1.0), (3e6, 2e6, 1e6)]),
+        Camera,
+        st.sampled_from([(0.0, 0.0, 4.0), (0.0, 0.0, 0.0), (0.25, 1.0, 0.5), (1.0, 1e-7, 1.0), (3e6, 2e6, 1e6)]),
         st.sampled_from([(0.0, 0.0, -9.0), (-1.0, -0.5, -3.0)]), vertical_fov_deg=st.sampled_from([20.0, 100.0]),
     ),
     exposure=st.sampled_from([1e-3, 1.0, 1e3]),

@@ -74,7 +74,7 @@ def test_full_maps_share_the_places_of_single_pixels(renderer: Renderer, size: t
     slots = slots_of(cells)
     assert len(set(slots.tolist())) == cells.cells == display.pixels
     aligned = cell_map(renderer, "aligned", (size[0] / 2, size[1] / 2), display)
-    place = {identity: slot for identity, slot in zip(identities(cells), slots.tolist(), strict=True)}
+    place = dict(zip(identities(cells), slots.tolist(), strict=True))
     for identity, slot in zip(identities(aligned), slots_of(aligned).tolist(), strict=True):
         assert identity[0] > 1 or place[identity] == slot
 

@@ -17,7 +17,7 @@ from renderer.pipeline import Renderer
 from renderer.scene import Material, Scene, Sphere, Surroundings, Texture
 from renderer.texture import srgb_to_linear, wrap
 from renderer.tonemap import encode_srgb
-from tests.renderer.drawing import U, WHITE, aim, quad, shoot
+from tests.renderer.drawing import WHITE, U, aim, quad, shoot
 
 AMBIENT = Surroundings(ambient=WHITE)
 

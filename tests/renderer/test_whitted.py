@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 
 import numpy as np
@@ -175,7 +176,7 @@ def test_h31_a_glass_slab_lets_12_of_13_through(renderer: Renderer, depth: int, 
 def straight_share(angle_deg: float, *indices: float) -> float:
     """What a ray keeps that crosses parallel faces between media of these indices."""
     sine, share = math.sin(math.radians(angle_deg)) * indices[0], 1.0
-    for before, behind in zip(indices[:-1], indices[1:], strict=True):
+    for before, behind in itertools.pairwise(indices):
         cosine, refracted = (math.sqrt(1 - (sine / n) ** 2) for n in (before, behind))
         share *= 1 - fresnel(cosine, refracted, before / behind)
     return share
