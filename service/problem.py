@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from http import HTTPStatus
 
 from fastapi import FastAPI, Request
@@ -26,6 +26,9 @@ CLIENT_CLOSED_REQUEST = 499
 
 RETRY_AFTER_S = 1
 """When a client that was turned away may ask again [s]."""
+
+Answer = Callable[[Request, Exception], Response]
+"""What a kind of error is answered with."""
 
 log = logging.getLogger(__name__)
 
@@ -76,17 +79,30 @@ def problem(
 
 def answer_errors(app: FastAPI) -> None:
     """Make `app` answer every error with a problem: the one table from errors to statuses."""
-    app.add_exception_handler(HTTPException, _http)
-    app.add_exception_handler(RequestValidationError, _invalid)
-    app.add_exception_handler(SettingsError, _settings)
-    app.add_exception_handler(OverLimit, _over_limit)
-    app.add_exception_handler(UnknownScene, lambda _, error: problem(404, str(error), "unknown-scene"))
-    app.add_exception_handler(SceneError, lambda _, error: problem(422, str(error), "broken-scene"))
-    app.add_exception_handler(NotReady, lambda _, error: _later(str(error), "not-ready"))
-    app.add_exception_handler(Busy, lambda _, error: _later(str(error), "busy"))
-    app.add_exception_handler(Stopping, lambda _, error: _later(str(error), "stopping"))
-    app.add_exception_handler(ClientLeft, lambda *_: Response(status_code=CLIENT_CLOSED_REQUEST))
-    app.add_exception_handler(Exception, _mistake)
+    answers: dict[type[Exception], Answer] = {
+        HTTPException: _http,
+        RequestValidationError: _invalid,
+        SettingsError: _settings,
+        OverLimit: _over_limit,
+        UnknownScene: lambda _, error: problem(404, str(error), "unknown-scene"),
+        SceneError: lambda _, error: problem(422, str(error), "broken-scene"),
+        NotReady: lambda _, error: _later(str(error), "not-ready"),
+        Busy: lambda _, error: _later(str(error), "busy"),
+        Stopping: lambda _, error: _later(str(error), "stopping"),
+        ClientLeft: lambda *_: Response(status_code=CLIENT_CLOSED_REQUEST),
+        Exception: _mistake,
+    }
+    for kind, answer in answers.items():
+        app.add_exception_handler(kind, _at_once(answer))
+
+
+def _at_once(answer: Answer) -> Callable[[Request, Exception], Awaitable[Response]]:
+    """`answer` on the event loop: a thread for it could be cancelled when the service stops, and the answer lost."""
+
+    async def answer_at_once(request: Request, error: Exception) -> Response:
+        return answer(request, error)
+
+    return answer_at_once
 
 
 def _later(detail: str, kind: str) -> Response:
