@@ -9,12 +9,16 @@ from __future__ import annotations
 
 import numpy as np
 from embreex.mesh_construction import TriangleMesh
+from embreex.rtcore import EmbreeDevice
 from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import NDArray
 
 from renderer.kernel import kernel
 from renderer.rays import Hits
 from renderer.sphere import SphereTree, nearest_spheres, shade_spheres
+
+DEVICE = EmbreeDevice()
+"""Shared by all scenes: with about a thousand devices of their own Embree gives out null pointers."""
 
 
 class Intersector:
@@ -100,7 +104,7 @@ def _embree_scene(vertices: NDArray[np.float32], faces: NDArray[np.int32]) -> Em
     """An Embree scene, robust mode, built; None where there is nothing to hit."""
     if len(faces) == 0:
         return None
-    scene = EmbreeScene(robust=True)
+    scene = EmbreeScene(DEVICE, robust=True)
     TriangleMesh(scene, np.ascontiguousarray(vertices), np.ascontiguousarray(faces))
     probe = np.zeros((1, 3), dtype=np.float32)
     scene.run(probe, np.array([[0, 0, 1]], dtype=np.float32), None, "INTERSECT")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,10 +34,12 @@ class NumberedMap:
     Attributes:
         cells: the map.
         slots: (n,) int64.
+        identity: stands for the map in other caches, so that they do not keep it in memory.
     """
 
     cells: CellMap
     slots: NDArray[np.int64]
+    identity: object = field(default_factory=object)
 
     @property
     def nbytes(self) -> int:
@@ -147,13 +149,13 @@ class Renderer:
         """The store of this view and sampling: shared by all aligned and full maps, one a scanline map."""
         quality = request.quality
         key = (
-            prepared,
+            prepared.identity,
             request.camera or prepared.scene.camera,
             request.display,
             quality.samples_per_cell,
             quality.antialiasing,
             quality.max_depth,
-            numbered if quality.map == "scanline" else None,
+            numbered.identity if quality.map == "scanline" else None,
         )
         return self.store_cache.get(key, lambda: SampleStore(slots_needed(numbered.cells)))[0]
 

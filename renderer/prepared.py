@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -87,6 +87,7 @@ class PreparedScene:
         surfaces: what the kernels read.
         intersector: what answers rays.
         nbytes: approximate size in memory.
+        identity: stands for the scene in caches, so that they do not keep the scene itself in memory.
     """
 
     scene: Scene
@@ -97,6 +98,7 @@ class PreparedScene:
     surfaces: Surfaces
     intersector: Intersector
     nbytes: int
+    identity: object = field(default_factory=object)
 
 
 EMBREE_BYTES_A_TRIANGLE = 150

@@ -197,3 +197,10 @@ def test_the_order_of_the_rays_changes_no_answer() -> None:
     straight, shuffled = made.nearest(origin, direction), made.nearest(origin[order], direction[order])
     np.testing.assert_array_equal(straight.primitive[order], shuffled.primitive)
     np.testing.assert_array_equal(straight.u[order], shuffled.u)
+
+
+def test_thousands_of_scenes_can_be_held_at_once() -> None:
+    many = [intersector(TRIANGLE + np.float32(i), np.array([[0, 1, 2]])) for i in range(3000)]
+    for i in (0, 1500, 2999):
+        origin, direction = rays([(i, i, i + 2)], [(0, 0, -1)])
+        assert many[i].nearest(origin, direction).distance.tolist() == [2.0]

@@ -9,18 +9,16 @@ import math
 import numpy as np
 import pytest
 
-from renderer import whitted
 from renderer.camera import Camera
 from renderer.fresnel import fresnel, refracted_cosine
 from renderer.pipeline import Renderer
-from renderer.scene import Material, Mesh, PointLight, Rgb, Scene, Sphere, Surroundings, Texture
-from renderer.whitted import SMALLEST_STEP, batch_end
+from renderer.scene import Material, Rgb, Scene, Sphere, Surroundings, Texture
+from renderer.whitted import SMALLEST_STEP
 from tests.renderer.drawing import (
     BLACK,
     EVERYWHERE_1,
     FINE,
     WHITE,
-    WHITE_LAMBERT,
     U,
     aim,
     ball_mesh,
@@ -38,53 +36,6 @@ from tests.renderer.drawing import (
 INSIDE = Camera((0, 0, 0), (0.3, 0.2, -1))
 HEIGHT = Surroundings(zenith=WHITE)
 """Radiance is the height of the ray's direction: rays that go level or down see nothing."""
-
-
-def moved(scene: Scene, factor: float, offset: Rgb) -> Scene:
-    """The whole scene and its camera larger by `factor` and elsewhere; light falls as before."""
-
-    def place(point: Rgb) -> Rgb:
-        x, y, z = (factor * a + b for a, b in zip(point, offset, strict=True))
-        return x, y, z
-
-    return dataclasses.replace(
-        scene,
-        meshes=tuple(dataclasses.replace(m, vertices=m.vertices * factor + np.array(offset)) for m in scene.meshes),
-        spheres=tuple(dataclasses.replace(s, center=place(s.center), radius=s.radius * factor) for s in scene.spheres),
-        lights=tuple(
-            dataclasses.replace(
-                lamp,
-                position=place(lamp.position),
-                intensity=tuple(factor * factor * part for part in lamp.intensity),
-            )
-            for lamp in scene.lights
-        ),
-        camera=dataclasses.replace(
-            scene.camera, position=place(scene.camera.position), look_at=place(scene.camera.look_at)
-        ),
-    )
-
-
-def everything() -> Scene:
-    """All effects at once; coordinates are multiples of 1/1024."""
-    checks = Texture(np.uint8([[[220] * 3, [40] * 3], [[40] * 3, [220] * 3]]))
-    tiles = Material("tiles", diffuse=(0.8, 0.7, 0.6), specular=(0.2, 0.2, 0.2), diffuse_texture=checks)
-    ground = floor(tiles, y=-0.5, half=2.0)
-    ground = dataclasses.replace(ground, uvs=ground.uvs * 7 if ground.uvs is not None else None)
-    ball = ball_mesh(Material("shiny", diffuse=(0.2, 0.4, 0.7), specular=(0.5,) * 3, reflection=(0.2,) * 3), 2, True)
-    vertices = np.round((0.375 * ball.vertices + (0.5, 0, -0.25)) * 1024) / 1024
-    return Scene(
-        meshes=(
-            ground,
-            dataclasses.replace(ball, vertices=vertices),
-            box((-1.5, -0.5, -1.5), (-1, 0.25, -1), mirror(0.9)),
-        ),
-        spheres=(Sphere((-0.375, 0, 0.25), 0.375, glass()), Sphere((0.125, -0.25, 0.75), 0.25, mirror(0.8))),
-        lights=(PointLight((1, 2, 1.5), (9e-8, 7e-8, 5e-8)), PointLight((-1.5, 1, 1), (2e-8, 3e-8, 4e-8))),
-        surroundings=Surroundings((1e-9, 2e-9, 4e-9), (3e-9, 3e-9, 2e-9), (5e-10, 5e-10, 5e-10)),
-        camera=Camera((0.25, 0.75, 3), (0, -0.125, 0), vertical_fov_deg=35),
-        exposure=1e8,
-    )
 
 
 # mirrors
@@ -320,115 +271,3 @@ def test_h40_what_is_bright_is_followed_although_its_share_is_small(renderer: Re
     level = next(depth for depth, seen in enumerate(bounces) if seen > 0)
     assert level == 3
     assert bounces[5] == pytest.approx(1000 * 0.04**3, rel=1e-5)
-
-
-# scenes that must look the same
-
-
-@pytest.mark.parametrize("power", [-20, -10, -1, 1, 10, 20, 38])
-def test_h17_a_power_of_two_changes_no_bit(renderer: Renderer, power: int) -> None:
-    scene = everything()
-    plain, scaled = (shoot(renderer, s, 48, 36, samples=2) for s in (scene, moved(scene, 2.0**power, (0, 0, 0))))
-    np.testing.assert_array_equal(scaled.pixels, plain.pixels)
-    assert scaled.cost.rays == plain.cost.rays
-    assert set(plain.cost.effects) == {"shadows", "specular", "textures", "reflection", "refraction"}
-
-
-@pytest.mark.parametrize("distance", [1.0, 16.0, 256.0, 1024.0, 8192.0])
-def test_h18_far_away_changes_no_bit(renderer: Renderer, distance: float) -> None:
-    scene = everything()
-    plain, far = (
-        shoot(renderer, s, 48, 36, samples=2) for s in (scene, moved(scene, 1.0, (distance, -distance, distance)))
-    )
-    np.testing.assert_array_equal(far.pixels, plain.pixels)
-
-
-def test_h12_faces_in_one_plane_show_one_of_them_always_the_same(renderer: Renderer) -> None:
-    """A grid twice, the second time shuffled and of another colour: any winner, but the same in every run."""
-    n = 16
-    y, x = np.mgrid[0 : n + 1, 0 : n + 1]
-    vertices = np.stack([x.ravel() - n / 2, y.ravel() - n / 2, 0.0 * x.ravel()], axis=1)
-    first = (np.arange(n)[:, None] * (n + 1) + np.arange(n)).ravel()
-    one = np.concatenate(
-        [np.stack([first, first + 1, first + n + 2], 1), np.stack([first, first + n + 2, first + n + 1], 1)]
-    )
-    two = np.concatenate(
-        [np.stack([first, first + 1, first + n + 1], 1), np.stack([first + 1, first + n + 2, first + n + 1], 1)]
-    )
-    two = np.random.default_rng(12).permutation(two)
-    red, green = (Material(diffuse=BLACK, emission=colour) for colour in ((1, 0, 0), (0, 1, 0)))
-    scene = Scene(meshes=(Mesh(vertices, one, red), Mesh(vertices, two, green)), camera=Camera((0, 0, 30), (0, 0, 0)))
-    seen = shoot(renderer, scene, 64, 64).pixels
-    assert set(np.unique(seen.reshape(-1, 3), axis=0).tobytes()) <= set(np.float32([0, 1]).tobytes())
-    for threads in (1, 3):
-        fresh = Renderer(threads=threads)
-        np.testing.assert_array_equal(shoot(fresh, scene, 64, 64).pixels, seen)
-        fresh.close()
-
-
-def russian_dolls(balls: int) -> Scene:
-    """Glass balls in glass balls over a textured floor under two lights."""
-    layers = tuple(
-        Sphere((0.03 * i, 0.02 * i, 0), 1.0 - 0.15 * i, glass(1.5 if i % 2 == 0 else 0.8)) for i in range(balls)
-    )
-    return Scene(
-        meshes=(floor(WHITE_LAMBERT, -1.2),),
-        spheres=layers,
-        lights=(light(3, 4, 5, 60.0), light(-3, 2, 1, 30.0)),
-        surroundings=Surroundings((0.2, 0.4, 0.9), (0.8, 0.7, 0.6)),
-        camera=Camera((0, 0.5, 6), (0, 0, 0), vertical_fov_deg=25),
-        exposure=30.0,
-    )
-
-
-def test_small_blocks_give_the_bits_that_large_blocks_give(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Glass in glass at depth 12; no level of one sample holds more than 270 rays."""
-    scene = russian_dolls(4)
-    large = shoot(renderer, scene, 24, 18, samples=3, depth=12)
-    assert large.cost.rays.total > 40 * large.cost.rays.primary
-    for block in (300, 500, 1000):
-        monkeypatch.setattr(whitted, "BLOCK_RAYS", block)
-        renderer.forget_samples()
-        small = shoot(renderer, scene, 24, 18, samples=3, depth=12)
-        np.testing.assert_array_equal(small.pixels, large.pixels)
-        assert small.cost.rays == large.cost.rays
-
-
-def test_a_sample_of_more_rays_than_a_block_is_traced_all_the_same(
-    renderer: Renderer, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Cut into parts its light is added up in another order, but nothing is lost, and memory stays bounded."""
-    scene = dataclasses.replace(russian_dolls(6), exposure=1e6)
-    large = shoot(renderer, scene, 2, 2, depth=14)
-    assert large.cost.rays.total > 4 * 4 * 64
-    monkeypatch.setattr(whitted, "BLOCK_RAYS", 64)
-    renderer.forget_samples()
-    small = shoot(renderer, scene, 2, 2, depth=14)
-    np.testing.assert_allclose(small.pixels, large.pixels, rtol=1e-5)
-    assert small.cost.rays == large.cost.rays
-
-
-def test_many_lights_make_blocks_smaller_and_change_nothing(renderer: Renderer) -> None:
-    """1,500 lights of which each gives a 1,500th are one light."""
-    few = Scene(meshes=(floor(WHITE_LAMBERT),), lights=(light(0, 2, 0, 15.0),), camera=Camera((0, 3, 4), (0, 0, 0)))
-    many = dataclasses.replace(few, lights=(light(0, 2, 0, 0.01),) * 1500)
-    one, all_of_them = (shoot(renderer, scene, 16, 12, samples=2) for scene in (few, many))
-    np.testing.assert_allclose(all_of_them.pixels, one.pixels, rtol=1e-4)
-    assert all_of_them.cost.rays.shadow == 1500 * one.cost.rays.shadow
-
-
-@pytest.mark.parametrize(
-    ("samples", "start", "block", "end"),
-    [
-        ([0, 0, 1, 1, 2], 0, 5, 5),
-        ([0, 0, 1, 1, 2], 0, 4, 4),
-        ([0, 0, 1, 1, 2], 0, 3, 2),
-        ([0, 0, 1, 1, 2], 2, 2, 4),
-        ([7, 7, 7, 7, 8], 0, 2, 2),
-        ([7, 7, 7, 7, 8], 2, 2, 4),
-        ([7, 7, 7, 7, 8], 3, 1, 4),
-        ([3, 3, 3], 1, 9, 3),
-    ],
-)
-def test_a_batch_ends_between_samples(samples: list[int], start: int, block: int, end: int) -> None:
-    assert batch_end(np.array(samples, np.int32), start, len(samples), block) == end
