@@ -93,12 +93,12 @@ def test_what_was_rendered_before_changes_no_byte(scene: PreparedScene, tiling: 
     fresh, used = Renderer(threads=2), Renderer(threads=2)
     truth = fresh.render(scene, wanted)
     for gaze in ((20, 20), (75, 33), (90, 60), (-40, 500)):
-        used.render(scene, request(gaze, quality))
         used.render(scene, request(gaze, dataclasses.replace(quality, samples_per_cell=5)))
         used.render(scene, request(gaze, dataclasses.replace(quality, antialiasing="regular")))
         used.render(scene, request(gaze, dataclasses.replace(quality, max_depth=1)))
         used.render(scene, dataclasses.replace(request(gaze, quality), camera=Camera((1, 1, 7), (0, 0, 0))))
         used.render(scene, request(gaze, dataclasses.replace(quality, acuity=Acuity(scale=3.0))))
+        used.render(scene, request(gaze, quality))
     again = used.render(scene, wanted)
     np.testing.assert_array_equal(again.pixels, truth.pixels)
     assert again.cost.rms_error == truth.cost.rms_error

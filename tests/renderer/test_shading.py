@@ -170,6 +170,16 @@ def test_a_highlight_lies_where_the_light_is_mirrored(renderer: Renderer) -> Non
     assert beside < 1e-30
 
 
+def test_a_light_behind_the_surface_makes_no_highlight(renderer: Renderer) -> None:
+    ground = floor(Material(diffuse=BLACK, specular=WHITE, shininess=1.0), casts_shadows=False)
+    camera = aim((-2, 0.5, 0), (0, 0, 0))
+    above, below = (
+        pixel(renderer, Scene(meshes=(ground,), lights=(light(2, y, 0),)), camera=camera) for y in (0.1, -0.1)
+    )
+    assert above > 0.1
+    assert below == 0.0
+
+
 # shadows
 
 

@@ -26,7 +26,7 @@ def request(gaze: tuple[float, float], quality: Quality, display: Display) -> Fr
     return FrameRequest(Gaze(*gaze), display, None, quality, linear=True)
 
 
-@pytest.mark.parametrize("samples", [4, 16])
+@pytest.mark.parametrize("samples", [2, 4, 16])
 @pytest.mark.parametrize("tiling", ["full", "aligned"])
 def test_the_stated_error_is_the_error(renderer: Renderer, tiling: str, samples: int) -> None:
     """Against the frame of 1,024 samples, within a fifth, on a picture of edges everywhere."""

@@ -93,6 +93,13 @@ def test_h23_a_smooth_mesh_has_no_black_triangles(renderer: Renderer, level: int
     np.testing.assert_allclose(shade[seen], truth[seen], atol=1e-5)
 
 
+def test_a_smooth_ball_from_inside(renderer: Renderer) -> None:
+    """A light of pi W/sr in the middle: the albedo in every direction, but for the flatness of 5,120 triangles."""
+    scene = Scene(meshes=(ball_mesh(WHITE_LAMBERT, 4, smooth=True),), lights=(light(0, 0, 0, math.pi),))
+    seen = shoot(renderer, scene, 48, 48, camera=Camera((0.1, 0.2, 0.3), (1, 0.5, 0), vertical_fov_deg=100)).pixels
+    np.testing.assert_allclose(seen, 1.0, atol=0.01)
+
+
 # normals that disagree with the geometry
 
 
