@@ -1,21 +1,19 @@
-"""What a surface sends back along a ray: Phong's local light, and the rays it spawns (Whitted 1980)."""
+"""What a surface sends back along a ray: the light on it, and the rays it spawns (Whitted 1980)."""
 
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from renderer.fresnel import fresnel, refracted_cosine
 from renderer.kernel import formula, kernel, prefetch
-from renderer.prepared import BOUNDARY, LIT, MIRROR, SPECULAR, Surfaces
+from renderer.lighting import light_from_points
+from renderer.prepared import BOUNDARY, LIT, MIRROR, Surfaces
 from renderer.rays import Hits, Rays, ShadowRays
-from renderer.surface import OFFSET_ULPS, Surface, sphere_surface, triangle_surface
+from renderer.surface import Surface, sphere_surface, triangle_surface
 from renderer.texture import look_up
-
-INVERSE_PI = 1.0 / math.pi
 
 AHEAD = 12
 """How many rays ahead a triangle is fetched from memory: its latency over the time of one ray."""
@@ -26,59 +24,6 @@ REFLECTIONS = 2
 REFRACTIONS = 3
 COUNTERS = 4
 """Slots of the counters that `shade` fills: rays spawned, shadow rays, and the former by kind."""
-
-
-@formula
-def phong_lobe(s: Surface, lx: float, ly: float, lz: float, vx: float, vy: float, vz: float, shininess: float) -> float:
-    """(R.V)^shininess, R the mirror image of the direction to the light; 0 where R faces away from V.
-
-    Args:
-        s: the surface.
-        lx, ly, lz: unit direction to the light.
-        vx, vy, vz: direction to the eye, of unit length but for float32 rounding, which a large exponent
-            would turn into a factor.
-        shininess: exponent, 0 to 1e9.
-    """
-    twice = 2.0 * (s.nx * lx + s.ny * ly + s.nz * lz)
-    cosine = (twice * s.nx - lx) * vx + (twice * s.ny - ly) * vy + (twice * s.nz - lz) * vz
-    if not cosine > 0.0:
-        return 0.0
-    return float(min(1.0, cosine / math.sqrt(vx * vx + vy * vy + vz * vz)) ** shininess)
-
-
-@formula
-def _light_to_eye(
-    s: Surface,
-    material: Any,
-    kr: float,
-    kg: float,
-    kb: float,
-    light: Any,
-    vx: float,
-    vy: float,
-    vz: float,
-) -> tuple[float, float, float, float]:
-    """Radiance that a surface of diffuse albedo (kr, kg, kb) sends towards (vx, vy, vz) of one light,
-    nothing being in between, and 1 over the light's distance; 0 for a light behind the surface or in it.
-    """
-    tx, ty, tz = light.x - s.px, light.y - s.py, light.z - s.pz
-    square = tx * tx + ty * ty + tz * tz
-    if not square > 0.0:
-        return 0.0, 0.0, 0.0, 0.0
-    inverse = 1.0 / math.sqrt(square)
-    tx, ty, tz = tx * inverse, ty * inverse, tz * inverse
-    cosine = tx * s.nx + ty * s.ny + tz * s.nz
-    if cosine <= 0.0:
-        return 0.0, 0.0, 0.0, 0.0
-    matt = cosine * INVERSE_PI
-    red, green, blue = kr * matt, kg * matt, kb * matt
-    if material.calls & SPECULAR != 0:
-        gloss = phong_lobe(s, tx, ty, tz, vx, vy, vz, material.shininess)
-        red += material.specular_red * gloss
-        green += material.specular_green * gloss
-        blue += material.specular_blue * gloss
-    falloff = inverse * inverse
-    return red * (light.red * falloff), green * (light.green * falloff), blue * (light.blue * falloff), inverse
 
 
 @formula
@@ -141,8 +86,6 @@ def shade(
     primitive_of, hit_u, hit_v = hits.primitive, hits.u, hits.v
     child_origin, child_direction = children.origin, children.direction
     child_weight, child_sample = children.weight, children.sample
-    shadow_origin, shadow_direction, shadow_reach = shadows.origin, shadows.direction, shadows.reach
-    shadow_light, shadow_sample = shadows.light, shadows.sample
     triangles = len(facets)
     counters[:] = 0
     n_children = 0
@@ -180,32 +123,9 @@ def shade(
         radiance[sample, 1] += wg * (material.emission_green + kg * around[2, 1])
         radiance[sample, 2] += wb * (material.emission_blue + kb * around[2, 2])
         if material.calls & LIT != 0:
-            for index in range(len(lights)):
-                light = lights[index]
-                red, green, blue, inverse = _light_to_eye(s, material, kr, kg, kb, light, -dx, -dy, -dz)
-                red, green, blue = wr * red, wg * green, wb * blue
-                if not max(red, max(green, blue)) > 0.0:
-                    continue
-                reach = 1.0 - OFFSET_ULPS * inverse * max(abs(light.x), max(abs(light.y), abs(light.z)))
-                if light.casts == 0 or not reach > 0.0:
-                    radiance[sample, 0] += red
-                    radiance[sample, 1] += green
-                    radiance[sample, 2] += blue
-                    continue
-                away = s.offset + s.lift
-                ox, oy, oz = s.px + away * s.gx, s.py + away * s.gy, s.pz + away * s.gz
-                shadow_origin[n_shadows, 0] = ox
-                shadow_origin[n_shadows, 1] = oy
-                shadow_origin[n_shadows, 2] = oz
-                shadow_direction[n_shadows, 0] = light.x - ox
-                shadow_direction[n_shadows, 1] = light.y - oy
-                shadow_direction[n_shadows, 2] = light.z - oz
-                shadow_reach[n_shadows] = reach
-                shadow_light[n_shadows, 0] = red
-                shadow_light[n_shadows, 1] = green
-                shadow_light[n_shadows, 2] = blue
-                shadow_sample[n_shadows] = sample
-                n_shadows += 1
+            n_shadows = light_from_points(
+                s, material, kr, kg, kb, wr, wg, wb, dx, dy, dz, sample, lights, radiance, shadows, n_shadows
+            )
         if not spawn or material.calls & (MIRROR | BOUNDARY) == 0:
             continue
         mr, mg, mb = float(material.reflection_red), float(material.reflection_green), float(material.reflection_blue)
@@ -248,21 +168,3 @@ def shade(
             counters[REFLECTIONS] += 1
     counters[CHILDREN] = n_children
     counters[SHADOWS] = n_shadows
-
-
-@kernel
-def add_unblocked(shadows: ShadowRays, blocked: NDArray[np.uint8], radiance: NDArray[np.float32]) -> None:
-    """Add the light of the shadow rays that reach it to their samples.
-
-    Args:
-        shadows: n shadow rays.
-        blocked: (n,) uint8, 1 where something is in between.
-        radiance: (samples, 3) float32.
-    """
-    light, sample_of = shadows.light, shadows.sample
-    for ray in range(len(blocked)):
-        if blocked[ray] == 0:
-            sample = sample_of[ray]
-            radiance[sample, 0] += light[ray, 0]
-            radiance[sample, 1] += light[ray, 1]
-            radiance[sample, 2] += light[ray, 2]

@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 from renderer.camera import Camera, ViewFrame, view_frame
 from renderer.display import Display
 from renderer.frame import RayCounts
+from renderer.lighting import add_unblocked
 from renderer.prepared import PreparedScene
 from renderer.quality import Quality
 from renderer.rays import Rays, first_shadow_rays, make_rays, make_shadow_rays, some_rays
 from renderer.sampling import camera_rays, lattice_step
-from renderer.shading import CHILDREN, COUNTERS, REFLECTIONS, REFRACTIONS, SHADOWS, add_unblocked, shade
+from renderer.shading import CHILDREN, COUNTERS, REFLECTIONS, REFRACTIONS, SHADOWS, shade
 
 BLOCK_RAYS = 8192
 """Rays traced together: what they carry stays in a core's second-level cache."""

@@ -1,0 +1,126 @@
+"""The light on a surface: what each light sends to the eye by way of it, and the shadow rays that ask for it."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.kernel import formula, kernel
+from renderer.rays import ShadowRays
+from renderer.reflectance import reflectance
+from renderer.surface import OFFSET_ULPS, Surface
+
+
+@formula
+def _light_to_eye(
+    s: Surface,
+    material: Any,
+    kr: float,
+    kg: float,
+    kb: float,
+    light: Any,
+    vx: float,
+    vy: float,
+    vz: float,
+) -> tuple[float, float, float, float]:
+    """Radiance that a surface of diffuse albedo (kr, kg, kb) sends towards (vx, vy, vz) of one light,
+    nothing being in between, and 1 over the light's distance; 0 for a light behind the surface or in it.
+    """
+    tx, ty, tz = light.x - s.px, light.y - s.py, light.z - s.pz
+    square = tx * tx + ty * ty + tz * tz
+    if not square > 0.0:
+        return 0.0, 0.0, 0.0, 0.0
+    inverse = 1.0 / math.sqrt(square)
+    tx, ty, tz = tx * inverse, ty * inverse, tz * inverse
+    cosine = tx * s.nx + ty * s.ny + tz * s.nz
+    if cosine <= 0.0:
+        return 0.0, 0.0, 0.0, 0.0
+    red, green, blue = reflectance(s, material, kr, kg, kb, cosine, tx, ty, tz, vx, vy, vz)
+    falloff = inverse * inverse
+    return red * (light.red * falloff), green * (light.green * falloff), blue * (light.blue * falloff), inverse
+
+
+@formula
+def light_from_points(
+    s: Surface,
+    material: Any,
+    kr: float,
+    kg: float,
+    kb: float,
+    wr: float,
+    wg: float,
+    wb: float,
+    dx: float,
+    dy: float,
+    dz: float,
+    sample: int,
+    lights: NDArray[np.void],
+    radiance: NDArray[np.float32],
+    shadows: ShadowRays,
+    n_shadows: int,
+) -> int:
+    """Add the light of the point lights to a sample, or write the shadow rays that decide about it.
+
+    Args:
+        s: the surface.
+        material: its row of the material table.
+        kr, kg, kb: diffuse albedo, textures included.
+        wr, wg, wb: share of the surface's light that reaches the eye.
+        dx, dy, dz: direction of the ray that met it.
+        sample: camera sample of the block.
+        lights: (l,) LIGHT.
+        radiance: (samples, 3) float32, added to.
+        shadows: shadow rays; room for another l.
+        n_shadows: how many there are.
+
+    Returns:
+        How many there are now.
+    """
+    for index in range(len(lights)):
+        light = lights[index]
+        red, green, blue, inverse = _light_to_eye(s, material, kr, kg, kb, light, -dx, -dy, -dz)
+        red, green, blue = wr * red, wg * green, wb * blue
+        if not max(red, max(green, blue)) > 0.0:
+            continue
+        reach = 1.0 - OFFSET_ULPS * inverse * max(abs(light.x), max(abs(light.y), abs(light.z)))
+        if light.casts == 0 or not reach > 0.0:
+            radiance[sample, 0] += red
+            radiance[sample, 1] += green
+            radiance[sample, 2] += blue
+            continue
+        away = s.offset + s.lift
+        ox, oy, oz = s.px + away * s.gx, s.py + away * s.gy, s.pz + away * s.gz
+        shadows.origin[n_shadows, 0] = ox
+        shadows.origin[n_shadows, 1] = oy
+        shadows.origin[n_shadows, 2] = oz
+        shadows.direction[n_shadows, 0] = light.x - ox
+        shadows.direction[n_shadows, 1] = light.y - oy
+        shadows.direction[n_shadows, 2] = light.z - oz
+        shadows.reach[n_shadows] = reach
+        shadows.light[n_shadows, 0] = red
+        shadows.light[n_shadows, 1] = green
+        shadows.light[n_shadows, 2] = blue
+        shadows.sample[n_shadows] = sample
+        n_shadows += 1
+    return n_shadows
+
+
+@kernel
+def add_unblocked(shadows: ShadowRays, blocked: NDArray[np.uint8], radiance: NDArray[np.float32]) -> None:
+    """Add the light of the shadow rays that reach it to their samples.
+
+    Args:
+        shadows: n shadow rays.
+        blocked: (n,) uint8, 1 where something is in between.
+        radiance: (samples, 3) float32.
+    """
+    light, sample_of = shadows.light, shadows.sample
+    for ray in range(len(blocked)):
+        if blocked[ray] == 0:
+            sample = sample_of[ray]
+            radiance[sample, 0] += light[ray, 0]
+            radiance[sample, 1] += light[ray, 1]
+            radiance[sample, 2] += light[ray, 2]
