@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.camera import Camera
+from renderer.camera_path import CameraPath
 from renderer.errors import SceneError, SettingsError, require_number
 
 Rgb = tuple[float, float, float]
@@ -215,6 +216,7 @@ class Scene:
         camera: the default view.
         exposure: factor from radiance to display-linear 0..1.
         title: one line for people.
+        camera_path: where the camera goes in a clip; None where it stays.
     """
 
     meshes: tuple[Mesh, ...] = ()
@@ -224,6 +226,7 @@ class Scene:
     camera: Camera = field(default_factory=Camera)
     exposure: float = 1.0
     title: str = ""
+    camera_path: CameraPath | None = None
 
     def __post_init__(self) -> None:
         require_number("scene.exposure", self.exposure, 0.0, MAX_RADIANCE, open_low=True)

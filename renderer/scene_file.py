@@ -1,14 +1,21 @@
 """Scenes in a folder: scene.toml beside the mesh and texture files that it names.
 
-A worked example, `vase/scene.toml`; every field is optional but those of a mesh, sphere or light without
-"or" behind them:
+A worked example, `vase/scene.toml`; every field is optional but those of a mesh, sphere, light
+or keyframe without "or" behind them:
 
 ```toml
 title = "A vase on a table"
 exposure = 1.0                     # factor from radiance to the display's 0..1
 
-[camera]                           # left out: frames the whole scene
+[camera]                           # left out: the first of the path below, or one that frames the whole scene
 position = [0.0, 1.5, 2.0]         # metres, y up
+look_at = [0.0, 0.9, 0.0]
+up = [0.0, 1.0, 0.0]               # or this default
+vertical_fov_deg = 40.0            # or 40
+
+[[camera_path]]                    # any number: views that the camera of a clip passes through, in order of time
+time_s = 0.0                       # since the clip began
+position = [0.0, 1.5, 2.0]
 look_at = [0.0, 0.9, 0.0]
 up = [0.0, 1.0, 0.0]               # or this default
 vertical_fov_deg = 40.0            # or 40
@@ -70,6 +77,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.camera import MAX_POSITION_M, Camera
+from renderer.camera_path import read_camera_path
 from renderer.codec import decode_texture
 from renderer.errors import SceneError, SettingsError
 from renderer.fields import Fields
@@ -147,12 +155,15 @@ class _Reader:
         lights = tuple(_light(fields) for fields in top.tables("light"))
         surroundings = _surroundings(top.table("surroundings")) if "surroundings" in top else STUDIO
         camera = _camera(top.table("camera")) if "camera" in top else None
+        camera_path = read_camera_path(top.tables("camera_path"))
+        if camera is None and camera_path is not None:
+            camera = camera_path.keyframes[0].camera
         top.refuse_unknown()
         if camera is None or "light" not in top:
             bounds = bounding_sphere(meshes, spheres, top.file)
             camera = camera or framed_camera(meshes, spheres, bounds)
             lights = lights if "light" in top else framed_lights(bounds, top.file)
-        return Scene(tuple(meshes), tuple(spheres), lights, surroundings, camera, exposure, title)
+        return Scene(tuple(meshes), tuple(spheres), lights, surroundings, camera, exposure, title, camera_path)
 
     def _material(self, fields: Fields, name: str) -> Material:
         texture = self._texture(fields) if "diffuse_texture" in fields else None

@@ -79,8 +79,9 @@ def test_the_worked_example(folder: Path) -> None:
 def test_the_worked_example_shows_every_field(folder: Path) -> None:
     stated = tomllib.loads(worked_example())
     expected = {
-        "": {"title", "exposure", "camera", "surroundings", "materials", "mesh", "sphere", "light"},
+        "": {"title", "exposure", "camera", "camera_path", "surroundings", "materials", "mesh", "sphere", "light"},
         "camera": {"position", "look_at", "up", "vertical_fov_deg"},
+        "camera_path": {"time_s", "position", "look_at", "up", "vertical_fov_deg"},
         "surroundings": {"zenith", "horizon", "ambient"},
         "mesh": {"file", "material", "scale", "rotate_deg", "translate", "casts_shadows"},
         "sphere": {"center", "radius", "material", "casts_shadows"},
@@ -158,7 +159,7 @@ def test_what_is_given_is_taken(folder: Path) -> None:
         ("exposure = 0", "vase/scene.toml: exposure: expected a number in (0, 1e+12], found 0"),
         ("exposure = nan", "vase/scene.toml: exposure: expected a number in (0, 1e+12], found nan"),
         ("exposure = true", "vase/scene.toml: exposure: expected a number"),
-        ("tilte = 'x'", "vase/scene.toml: tilte: expected one of the fields camera, exposure, light"),
+        ("tilte = 'x'", "vase/scene.toml: tilte: expected one of the fields camera, camera_path, exposure, light"),
         ("camera = 1", "vase/scene.toml: camera: expected a table of fields, found 1"),
         ("[camera]\nposition = [0, 0, 1]", "vase/scene.toml: camera.look_at: expected 3 numbers, found nothing"),
         ("[camera]\nposition = [0, 0]\nlook_at = [0, 0, 0]", "vase/scene.toml: camera.position: expected 3 numbers"),
