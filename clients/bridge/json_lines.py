@@ -1,0 +1,84 @@
+"""Self-made devices that send a JSON object a line."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from clients.bridge.codec import BadRecord, Line, LineCodec
+from clients.bridge.errors import ConfigError
+from clients.bridge.fields import KNOWN_FIELDS, sample_of
+from clients.bridge.sample import Point, Sample
+
+DEFAULT_PATHS = {"x": "x", "y": "y", "t": "t", "v": "v"}
+OPTIONAL = frozenset(("t", "v"))
+
+
+class JsonLines(LineCodec):
+    """A JSON object a line.
+
+    Args:
+        paths: where each field (x, y, t, v, xl, yl, xr, yr) stands, keys joined by dots: `gaze.x`, `eyes.0.x`. t and v
+            may be missing in a record.
+
+    Raises:
+        ConfigError: for other fields, or without x and y.
+    """
+
+    name = "jsonl"
+
+    def __init__(self, paths: dict[str, str] | None = None) -> None:
+        super().__init__()
+        self._paths = {
+            field: tuple(path.split(".")) for field, path in (DEFAULT_PATHS if paths is None else paths).items()
+        }
+        pairs = ({"x", "y"}, {"xl", "yl", "xr", "yr"})
+        if not self._paths.keys() <= KNOWN_FIELDS or not any(pair <= self._paths.keys() for pair in pairs):
+            raise ConfigError("paths", "x and y, or xl, yl, xr, yr, with t and v", ",".join(self._paths))
+
+    def read(self, line: Line) -> list[Sample]:
+        """The sample of a line."""
+        try:
+            record = json.loads(line.text)
+        except ValueError:
+            raise BadRecord(line.text) from None
+        found = {field: _at(record, path) for field, path in self._paths.items()}
+        words = {field: _word(value) for field, value in found.items() if value is not _ABSENT}
+        if self._paths.keys() - words.keys() - OPTIONAL:
+            raise BadRecord(line.text)
+        return [sample_of(line, words)]
+
+    def encode(self, time_ns: int, point: Point | None) -> bytes:
+        """A line; a lost eye is null."""
+        x, y = (None, None) if point is None else (round(point.x, 5), round(point.y, 5))
+        values = {"t": time_ns, "v": point is not None} | dict.fromkeys(("x", "xl", "xr"), x)
+        values |= dict.fromkeys(("y", "yl", "yr"), y)
+        record: dict[str, Any] = {}
+        for field, path in self._paths.items():
+            place = record
+            for key in path[:-1]:
+                place = place.setdefault(key, {})
+            place[path[-1]] = values[field]
+        return json.dumps(record).encode("ascii") + b"\n"
+
+
+_ABSENT = object()
+
+
+def _at(record: Any, path: tuple[str, ...]) -> Any:
+    """What stands at a path; list items by number."""
+    for key in path:
+        if isinstance(record, dict) and key in record:
+            record = record[key]
+        elif isinstance(record, list) and key.isdecimal() and int(key) < len(record):
+            record = record[int(key)]
+        else:
+            return _ABSENT
+    return record
+
+
+def _word(value: Any) -> str:
+    """A JSON value as text; null and NaN say that the eye is lost."""
+    if isinstance(value, dict | list):
+        raise BadRecord(str(value))
+    return str(value)
