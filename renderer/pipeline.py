@@ -15,8 +15,9 @@ from renderer.eccentricity import eccentricity_deg
 from renderer.frame import Frame, FrameCost, FrameRequest, RayCounts, StageTimes
 from renderer.gaze import Gaze, GazeBucket, bucket_of
 from renderer.prepared import PreparedScene, prepare
-from renderer.quality import MAPS, Quality
+from renderer.quality import MAPS, RECONSTRUCTIONS, Quality
 from renderer.reconstruction import reconstruct
+from renderer.smooth import reconstruct_smooth
 from renderer.standard_error import standard_errors
 from renderer.store import SampleStore, add_samples, missing_cells, slots_needed, slots_of
 from renderer.warmup import every_effect
@@ -98,7 +99,8 @@ class Renderer:
         with store.lock:
             traced, rays, rejected = self._trace_missing(prepared, request, numbered, store)
             done = time.perf_counter()
-            pixels = reconstruct(
+            rebuild = reconstruct_smooth if request.quality.reconstruction == "smooth" else reconstruct
+            pixels = rebuild(
                 numbered.cells, numbered.slots, store.samples, prepared.scene.exposure, request.linear, self._pool
             )
             errors = standard_errors(
@@ -131,8 +133,9 @@ class Renderer:
         scene = prepare(every_effect())
         for kind in MAPS:
             for linear in (False, True):
-                quality = Quality(map=kind, samples_per_cell=2)
-                self.render(scene, FrameRequest(Gaze(1e4, 16.0), display, None, quality, linear))
+                for reconstruction in RECONSTRUCTIONS:
+                    quality = Quality(map=kind, samples_per_cell=2, reconstruction=reconstruction)
+                    self.render(scene, FrameRequest(Gaze(1e4, 16.0), display, None, quality, linear))
         eccentricity_deg(display, Gaze(0.0, 0.0))
 
     def _map(self, display: Display, quality: Quality, gaze: Gaze) -> tuple[NumberedMap, bool]:

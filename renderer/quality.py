@@ -9,7 +9,7 @@ from renderer.errors import require_choice, require_integer
 
 MAPS = ("aligned", "scanline", "full")
 ANTIALIASING = ("stochastic", "regular")
-RECONSTRUCTIONS = ("nearest",)
+RECONSTRUCTIONS = ("nearest", "smooth")
 MAX_SAMPLES = 4096
 MAX_DEPTH = 64
 MAX_BUCKET_PX = 512
@@ -28,7 +28,8 @@ class Quality:
             `regular` places over the cell's area.
         max_depth: how many mirrors and boundaries a ray may meet, 0 to 64.
         acuity: the eye's resolution.
-        reconstruction: how cells become pixels.
+        reconstruction: how cells become pixels: `nearest`, each pixel its cell's colour (the paper's), or
+            `smooth`, cells blended into their neighbours.
 
     Raises:
         SettingsError: naming the field, for a value out of range.

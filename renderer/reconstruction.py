@@ -43,7 +43,7 @@ def reconstruct(
 
         def average(chunk: int) -> None:
             part = slice(chunk * STRIP_CELLS, (chunk + 1) * STRIP_CELLS)
-            _mean_radiance(samples, slots[part], means[part])
+            mean_radiance(samples, slots[part], np.float32(1.0), means[part])
 
         def spread(strip: int) -> None:
             part = slice(strip * STRIP_ROWS, (strip + 1) * STRIP_ROWS)
@@ -69,11 +69,19 @@ def reconstruct(
 
 
 @kernel
-def _mean_radiance(samples: Samples, slots: NDArray[np.int64], means: NDArray[np.float32]) -> None:
+def mean_radiance(samples: Samples, slots: NDArray[np.int64], exposure: np.float32, means: NDArray[np.float32]) -> None:
+    """Exposed mean of each cell.
+
+    Args:
+        samples: the store.
+        slots: (n,) int64 slots of the cells.
+        exposure: factor.
+        means: (n, 3) float32, written.
+    """
     total, count = samples.total, samples.number
     for cell in range(len(slots)):
         slot = slots[cell]
-        share = np.float32(1.0) / np.float32(count[slot])
+        share = exposure * (np.float32(1.0) / np.float32(count[slot]))
         for channel in range(3):
             means[cell, channel] = total[slot, channel] * share
 

@@ -45,7 +45,10 @@ BucketPx = Annotated[
 Samples = Annotated[int, Field(ge=1, le=MAX_SAMPLES, description="camera rays a cell")]
 Antialiasing = Annotated[Literal["stochastic", "regular"], Field(description="where in a cell they go")]
 Depth = Annotated[int, Field(ge=0, le=MAX_DEPTH, description="mirrors and boundaries a ray may meet")]
-Reconstruction = Annotated[Literal["nearest"], Field(description="how cells become pixels")]
+Reconstruction = Annotated[
+    Literal["nearest", "smooth"],
+    Field(description="how cells become pixels: each its cell's colour, or cells blended into their neighbours"),
+]
 AcuityModel = Annotated[
     Literal["peli", "geisler-perry", "guenter"], Field(description="what the eye resolves away from the gaze")
 ]

@@ -13,7 +13,7 @@ from renderer.display import Display
 from renderer.errors import SettingsError
 from renderer.frame import FrameRequest
 from renderer.gaze import Gaze
-from renderer.quality import ANTIALIASING, MAPS, Quality
+from renderer.quality import ANTIALIASING, MAPS, RECONSTRUCTIONS, Quality
 
 FLAG_OF_FIELD = {
     "gaze": "--gaze",
@@ -31,6 +31,7 @@ FLAG_OF_FIELD = {
     "quality.samples_per_cell": "--samples",
     "quality.antialiasing": "--antialiasing",
     "quality.max_depth": "--max-depth",
+    "quality.reconstruction": "--reconstruction",
     "quality.acuity.model": "--acuity-model",
     "quality.acuity.eccentricity": "--eccentricity",
     "quality.acuity.scale": "--acuity-scale",
@@ -103,6 +104,7 @@ def _add_quality_flags(detail: argparse._ArgumentGroup, samples: int) -> None:
         detail.add_argument(flag, type=kind, default=value, metavar=metavar, help=f"{text} (default {value:g})")
     choices = (
         ("--antialiasing", default.antialiasing, "KIND", "where a cell's samples go", ANTIALIASING),
+        ("--reconstruction", default.reconstruction, "KIND", "how cells become pixels", RECONSTRUCTIONS),
         ("--acuity-model", default.acuity.model, "MODEL", "how acuity falls off from the gaze", MODELS),
         ("--eccentricity", default.acuity.eccentricity, "KIND", "eye before the screen or the gaze", ECCENTRICITIES),
     )
@@ -156,6 +158,7 @@ def quality_of(arguments: argparse.Namespace) -> Quality:
         antialiasing=arguments.antialiasing,
         max_depth=arguments.max_depth,
         acuity=acuity,
+        reconstruction=arguments.reconstruction,
     )
 
 
