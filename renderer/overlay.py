@@ -1,4 +1,4 @@
-"""Drawings on top of a frame: its cells, the rings around the gaze, the gaze itself.
+"""Drawings on top of a frame: its cells, the rays they cost, the rings around the gaze, the gaze itself.
 
 Every function takes (h, w, 3) uint8 pixels and returns a new array of the same shape; the frame
 itself is never changed.
@@ -26,6 +26,19 @@ CELL_TINT = 0.45
 
 CELL_EDGE = 0.55
 """Factor on the pixels along a cell's left and upper edge."""
+
+RAY_COLOURS = np.array(
+    [[0, 0, 4], [87, 16, 110], [188, 55, 84], [249, 142, 9], [252, 255, 164]],
+    dtype=np.float64,
+)
+"""sRGB of 1/64, 1/8, 1, 8 and 64 camera rays a pixel, blended in between (five stops of inferno; Smith and van der
+Walt 2015)."""
+
+RAY_STEP = 8.0
+"""Factor in rays from one stop of `RAY_COLOURS` to the next; the middle one is one ray a pixel."""
+
+RAY_TINT = 0.65
+"""Share of the rays' colour in a pixel."""
 
 SMALLEST_OUTLINED_PX = 4
 """Side from which a cell gets an outline; the outline of a smaller one would hide it."""
@@ -66,6 +79,27 @@ def draw_cells(pixels: NDArray[np.uint8], cell_map: CellMap) -> NDArray[np.uint8
     edge = _cell_edges(cell_map)
     drawn[edge] = (drawn[edge] * CELL_EDGE).astype(np.uint8)
     return drawn
+
+
+def draw_rays(pixels: NDArray[np.uint8], cell_map: CellMap, samples_per_cell: int) -> NDArray[np.uint8]:
+    """Tint each cell by the camera rays it gets for each of its pixels.
+
+    Args:
+        pixels: (h, w, 3) uint8 frame.
+        cell_map: the cells of a screen of the same size.
+        samples_per_cell: camera rays a cell, 1 or more.
+
+    Raises:
+        ValueError: if frame and map differ in size.
+    """
+    if pixels.shape != (*cell_map.mask.shape, 3):
+        raise ValueError(f"expected pixels of shape {(*cell_map.mask.shape, 3)}, found {pixels.shape}")
+    rays = samples_per_cell / np.square(cell_map.side, dtype=np.float64)
+    stops = np.arange(len(RAY_COLOURS)) - len(RAY_COLOURS) // 2
+    steps = np.log(rays) / np.log(RAY_STEP)
+    colours = np.stack([np.interp(steps, stops, channel) for channel in RAY_COLOURS.T], axis=1)
+    added = np.rint(colours * RAY_TINT).astype(np.uint8)
+    return (pixels * (1 - RAY_TINT)).astype(np.uint8) + added[cell_map.mask]
 
 
 def draw_region_of_interest(

@@ -12,7 +12,7 @@ from starlette.responses import Response
 
 from renderer.cellmap import CellMap
 from renderer.codec import CONTENT_TYPE, encode
-from renderer.overlay import draw_cells
+from renderer.overlay import draw_cells, draw_rays
 from service.desk import TheDesk
 from service.openapi import ERRORS
 from service.rendering import NS_PER_MS
@@ -59,7 +59,7 @@ class CellCounts(BaseModel):
     },
 )
 async def cellmap(query: Annotated[CellMapQuery, Query()], request: Request, desk: TheDesk) -> Response:
-    """How the screen is divided for a gaze: numbers, or a picture of the cells coloured by size."""
+    """How the screen is divided for a gaze: numbers, or a picture of the cells coloured by size or by rays a pixel."""
     display, quality, gaze = query.display(), query.quality(), query.gaze()
     desk.studio.check(display, quality)
     desk.studio.require_ready()
@@ -70,7 +70,8 @@ async def cellmap(query: Annotated[CellMapQuery, Query()], request: Request, des
         cells, cached = desk.studio.cell_map(display, quality, gaze)
         map_ms = (time.monotonic_ns() - started_ns) / NS_PER_MS
         if as_picture:
-            return Response(_drawing(cells), media_type=CONTENT_TYPE["png"])
+            drawing = _drawing(cells, query.drawing, quality.samples_per_cell)
+            return Response(drawing, media_type=CONTENT_TYPE["png"])
         counts = _counts(cells, cached, quality.samples_per_cell, map_ms)
         return Response(counts.model_dump_json(), media_type="application/json")
 
@@ -85,8 +86,10 @@ def _prefers_png(accept: str) -> bool:
     return "image/png" in named and "application/json" not in named
 
 
-def _drawing(cells: CellMap) -> bytes:
+def _drawing(cells: CellMap, drawing: str, samples_per_cell: int) -> bytes:
     background = np.full((*cells.mask.shape, 3), BACKGROUND, dtype=np.uint8)
+    if drawing == "rays":
+        return encode(draw_rays(background, cells, samples_per_cell), "png")
     return encode(draw_cells(background, cells), "png")
 
 

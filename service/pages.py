@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import hashlib
 from importlib import resources
-from typing import Annotated, Literal
+from pathlib import Path
+from typing import Literal
 
-from fastapi import APIRouter, HTTPException, Path, Request
+from fastapi import APIRouter, HTTPException, Request
 from pydantic import BaseModel, Field
 from starlette.responses import HTMLResponse, Response
 
@@ -14,13 +15,11 @@ from service.desk import TheDesk
 from service.docs import documentation
 from service.openapi import ERRORS
 
+MEDIA_TYPE_OF_SUFFIX = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
+
 MEDIA_TYPES = {
-    "index.html": "text/html",
-    "docs.css": "text/css",
-    "page.css": "text/css",
-    "page.js": "text/javascript",
-    "frame_source.js": "text/javascript",
-    "icon.svg": "image/svg+xml",
+    file.name: MEDIA_TYPE_OF_SUFFIX[Path(file.name).suffix]
+    for file in resources.files("service").joinpath("page").iterdir()
 }
 """The page's files, and what each is."""
 
@@ -48,7 +47,7 @@ async def index(request: Request) -> Response:
 
 
 @router.get("/page/{name}", include_in_schema=False)
-async def page_file(name: Annotated[str, Path()], request: Request) -> Response:
+async def page_file(name: str, request: Request) -> Response:
     """A file of the page."""
     if name not in MEDIA_TYPES:
         raise HTTPException(404)

@@ -242,6 +242,9 @@ class CellMapQuery(CellQuery):
     format: Literal["png", "json"] | None = Field(
         default=None, description="none: what the Accept header prefers, else JSON"
     )
+    drawing: Literal["cells", "rays"] = Field(
+        default="cells", description="of a picture: the cells coloured by their side, or by camera rays a pixel"
+    )
 
 
 class FrameQuery(CellQuery):

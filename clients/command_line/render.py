@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 FORMAT_OF_SUFFIX = {".png": "png", ".jpg": "jpeg", ".jpeg": "jpeg", ".webp": "webp", ".raw": "raw"}
 MOST_THREADS = 1024
-OVERLAYS = ("cells", "roi", "gaze")
+OVERLAYS = ("cells", "rays", "roi", "gaze")
 
 DESCRIPTION = """\
 Render one frame of SCENE, fine where the gaze is and coarser where the eye could not tell, and say what it cost.
@@ -73,7 +73,8 @@ def add(commands: argparse._SubParsersAction[Any]) -> None:
         action="append",
         default=[],
         choices=OVERLAYS,
-        help="draw the cells, the rings at 2.5, 5 and 10 deg, or a cross at the gaze on top; may be repeated",
+        help="draw the cells, their rays a pixel, the rings at 2.5, 5 and 10 deg, or a cross at the gaze on top; "
+        "may be repeated",
     )
     output.add_argument("--json", action="store_true", help="print the cost as JSON")
     add_threads(parser)
@@ -184,13 +185,16 @@ def write_whole(path: Path, data: bytes) -> None:
 def draw_overlays(
     pixels: NDArray[np.uint8] | NDArray[np.float32], request: FrameRequest, renderer: Renderer, overlays: list[str]
 ) -> NDArray[Any]:
-    """`pixels` with the overlays that were asked for, cells below, the gaze on top."""
-    from renderer.overlay import draw_cells, draw_gaze, draw_region_of_interest
+    """`pixels` with the overlays that were asked for, rays and cells below, the gaze on top."""
+    from renderer.overlay import draw_cells, draw_gaze, draw_rays, draw_region_of_interest
 
     drawn: NDArray[Any] = pixels
-    if "cells" in overlays:
+    if "rays" in overlays or "cells" in overlays:
         cell_map, _ = renderer.cell_map(request.display, request.quality, request.gaze)
-        drawn = draw_cells(drawn, cell_map)
+        if "rays" in overlays:
+            drawn = draw_rays(drawn, cell_map, request.quality.samples_per_cell)
+        if "cells" in overlays:
+            drawn = draw_cells(drawn, cell_map)
     if "roi" in overlays:
         drawn = draw_region_of_interest(drawn, request.display, request.gaze, request.quality.acuity.eccentricity)
     if "gaze" in overlays:

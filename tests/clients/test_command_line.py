@@ -298,11 +298,12 @@ def test_overlays_are_drawn_on_the_frame(tmp_path: Path) -> None:
     screen = ("--size", "320x180", "--acuity-scale", "4", "--gaze", "100,90", "--samples", "1")
     assert main(["render", "spheres", *screen, "-o", "plain.png"]) == 0
     plain = pixels_of(tmp_path / "plain.png")
-    for overlay in ("cells", "roi", "gaze"):
+    for overlay in ("cells", "rays", "roi", "gaze"):
         assert main(["render", "spheres", *screen, "--overlay", overlay, "-o", f"{overlay}.png"]) == 0
-    gaze, cells, rings = (pixels_of(tmp_path / f"{overlay}.png") for overlay in ("gaze", "cells", "roi"))
+    gaze, cells, rays, rings = (pixels_of(tmp_path / f"{overlay}.png") for overlay in ("gaze", "cells", "rays", "roi"))
     assert 0 < (gaze != plain).any(axis=2).sum() < 200
     assert 0.3 < (cells != plain).any(axis=2).mean() < 1.0
+    assert (rays != plain).any(axis=2).mean() > 0.9
     assert 0.005 < (rings != plain).any(axis=2).mean() < 0.2
     assert main(["render", "spheres", *screen, "--overlay", "cells", "--overlay", "gaze", "-o", "both.png"]) == 0
     both = pixels_of(tmp_path / "both.png")

@@ -13,10 +13,13 @@ from renderer.gaze import Gaze, GazeBucket
 from renderer.overlay import (
     CELL_TINT,
     CROSS_COLOUR,
+    RAY_COLOURS,
+    RAY_TINT,
     RINGS,
     SIDE_COLOURS,
     draw_cells,
     draw_gaze,
+    draw_rays,
     draw_region_of_interest,
 )
 
@@ -72,6 +75,18 @@ def test_large_cells_have_dark_edges_where_they_meet_and_small_ones_none() -> No
     for x, y in ((7, 3), (0, 0), (3, 0), (9, 9)):
         np.testing.assert_array_equal(large[y, x], inside, f"no edge at {x}, {y}")
     assert len(np.unique(draw_cells(frame, squares(2, 8, 8)).reshape(-1, 3), axis=0)) == 1
+
+
+@pytest.mark.parametrize(
+    ("samples", "side", "stop"),
+    [(1, 16, 0), (1, 8, 0), (8, 8, 1), (1, 1, 2), (64, 8, 2), (8, 1, 3), (64, 1, 4), (256, 1, 4)],
+)
+def test_rays_a_pixel_are_samples_over_the_area_of_the_cell(samples: int, side: int, stop: int) -> None:
+    drawn = draw_rays(grey(16, 16, 0), squares(side, 16 // side, 16 // side), samples)
+    np.testing.assert_allclose(drawn, np.broadcast_to(RAY_COLOURS[stop] * RAY_TINT, drawn.shape), atol=0.51)
+    assert draw_rays(grey(16, 16, 255), squares(side, 16 // side, 16 // side), samples).min() >= 89, (
+        "never wraps around"
+    )
 
 
 def test_rings_lie_where_the_eccentricity_crosses_them() -> None:
@@ -152,5 +167,7 @@ def test_the_frame_itself_is_never_changed() -> None:
 def test_a_frame_of_another_size_is_refused() -> None:
     with pytest.raises(ValueError, match=r"expected pixels of shape \(16, 16, 3\), found \(90, 160, 3\)"):
         draw_cells(grey(90, 160), squares(8, 2, 2))
+    with pytest.raises(ValueError, match="expected pixels of shape"):
+        draw_rays(grey(90, 160), squares(8, 2, 2), 1)
     with pytest.raises(ValueError, match="expected pixels of shape"):
         draw_region_of_interest(grey(16, 16), SMALL, Gaze(0.0, 0.0))

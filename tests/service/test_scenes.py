@@ -102,3 +102,5 @@ def test_the_drawing_shows_fine_cells_at_the_gaze_and_outlined_ones_far_away(cli
     far = drawn[-60:, -60:]
     assert len(np.unique(far.reshape(-1, 3), axis=0)) >= 2
     assert not np.array_equal(drawn[2, 2], drawn[-3, -3])
+    rays = decode_texture(client.get("/v1/cellmap", params={**corner, "drawing": "rays"}).content, "reply").pixels
+    assert rays[2, 2].sum() > rays[-3, -3].sum() + 50, "brighter where there are more"
