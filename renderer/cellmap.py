@@ -18,7 +18,7 @@ from renderer.tiling import (
     number_scanline_cells,
     strip_rows,
 )
-from renderer.workers import WorkerPool
+from renderer.workers import Workers
 
 FULL_STRIP_ROWS = 64
 """Rows of the strips in which work over whole pixels is divided."""
@@ -62,7 +62,7 @@ class CellMap:
         return self.x.nbytes + self.y.nbytes + self.side.nbytes + self.mask.nbytes
 
 
-def build_cell_map(kind: str, display: Display, acuity: Acuity, bucket: GazeBucket, pool: WorkerPool) -> CellMap:
+def build_cell_map(kind: str, display: Display, acuity: Acuity, bucket: GazeBucket, pool: Workers) -> CellMap:
     """Tile `display` for every gaze of `bucket`.
 
     Args:
@@ -91,7 +91,7 @@ def _full_map(display: Display, bucket: GazeBucket) -> CellMap:
     return _numbered("full", bucket, [corners], [width * height], height)
 
 
-def _aligned_map(eye: EyeGeometry, bucket: GazeBucket, pool: WorkerPool) -> CellMap:
+def _aligned_map(eye: EyeGeometry, bucket: GazeBucket, pool: Workers) -> CellMap:
     rows = strip_rows(largest_cell_side(eye), eye.height_px)
     tops = range(0, eye.height_px, rows)
     corners = [np.zeros((min(rows, eye.height_px - top), eye.width_px), dtype=np.uint16) for top in tops]
@@ -106,7 +106,7 @@ def _aligned_map(eye: EyeGeometry, bucket: GazeBucket, pool: WorkerPool) -> Cell
     return _numbered("aligned", bucket, corners, counts, rows, pool)
 
 
-def _scanline_map(eye: EyeGeometry, bucket: GazeBucket, pool: WorkerPool) -> CellMap:
+def _scanline_map(eye: EyeGeometry, bucket: GazeBucket, pool: Workers) -> CellMap:
     shape = (eye.height_px, eye.width_px)
     sizes = np.zeros(shape, dtype=np.uint16)
 
@@ -129,7 +129,7 @@ def _numbered(
     corners: list[NDArray[np.uint16]],
     counts: list[int],
     rows: int,
-    pool: WorkerPool | None = None,
+    pool: Workers | None = None,
 ) -> CellMap:
     """Number the cells of strips of `rows` rows whose corners are marked."""
     first = np.concatenate(([0], np.cumsum(counts, dtype=np.int64)))

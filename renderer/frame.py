@@ -9,8 +9,13 @@ from numpy.typing import NDArray
 
 from renderer.camera import Camera
 from renderer.display import Display
+from renderer.errors import require_integer
 from renderer.gaze import Gaze
 from renderer.quality import Quality
+
+
+class Abandoned(Exception):
+    """A frame that was given up before it was finished; samples already traced are kept."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,6 +28,12 @@ class FrameRequest:
         camera: the view; None for the scene's own.
         quality: what it may cost.
         linear: True for float32 linear radiance in place of the 8-bit picture.
+        samples: how many of `quality.samples_per_cell` each cell needs by now, 1 or more; None for all of
+            them. With fewer, the frame shows all samples that are there already, so that a frame grows from
+            request to request and ends as the one that a fresh process would make at once.
+
+    Raises:
+        SettingsError: naming the field, for a number of samples out of range.
     """
 
     gaze: Gaze
@@ -30,6 +41,11 @@ class FrameRequest:
     camera: Camera | None
     quality: Quality
     linear: bool = False
+    samples: int | None = None
+
+    def __post_init__(self) -> None:
+        if self.samples is not None:
+            require_integer("samples", self.samples, 1, self.quality.samples_per_cell)
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,12 +81,16 @@ class FrameCost:
         cells: cells of the map.
         bucket_px: side of the gaze bucket [px].
         map_cached: whether the map came from the cache.
-        samples_per_cell: camera rays a cell.
-        cells_traced, cells_reused: cells traced for this frame, and taken from the sample store.
+        samples_per_cell: camera samples that each cell was to have by now.
+        samples_traced: camera samples traced for this frame.
+        mean_samples: camera samples that the frame shows, a cell on average.
+        acuity_scale: factor on the cells' width that was used.
+        deadline_met: whether the frame was finished in time; None without a deadline.
+        cells_traced, cells_reused: cells traced for this frame, and taken from the sample store as they were.
         rays: rays traced for this frame.
         effects: names of the effects that the scene calls for and that ran.
         rms_error, foveal_rms_error: estimated standard error of the linear frame over the screen and
-            within 2.5 deg of the gaze; None with fewer than two samples a cell (or nothing there).
+            within 2.5 deg of the gaze; None with fewer than two samples in any cell (or nothing there).
         rejected_samples: samples that were not finite and count as black; 0 unless something is broken.
         time_ms: stages.
     """
@@ -80,6 +100,10 @@ class FrameCost:
     bucket_px: int
     map_cached: bool
     samples_per_cell: int
+    samples_traced: int
+    mean_samples: float
+    acuity_scale: float
+    deadline_met: bool | None
     cells_traced: int
     cells_reused: int
     rays: RayCounts

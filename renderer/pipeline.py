@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from dataclasses import dataclass, field
 
@@ -12,17 +13,18 @@ from renderer.cache import ByteCache
 from renderer.cellmap import CellMap, build_cell_map
 from renderer.display import Display
 from renderer.eccentricity import eccentricity_deg
-from renderer.frame import Frame, FrameCost, FrameRequest, RayCounts, StageTimes
+from renderer.frame import Frame, FrameCost, FrameRequest, StageTimes
 from renderer.gaze import Gaze, GazeBucket, bucket_of
+from renderer.growth import grow
 from renderer.prepared import PreparedScene, prepare
 from renderer.quality import MAPS, RECONSTRUCTIONS, Quality
 from renderer.reconstruction import reconstruct
 from renderer.smooth import reconstruct_smooth
 from renderer.standard_error import standard_errors
-from renderer.store import SampleStore, add_samples, missing_cells, slots_needed, slots_of
+from renderer.store import SampleStore, slots_needed, slots_of
 from renderer.warmup import every_effect
-from renderer.whitted import Cells, block_rays, trace_cells, view_of
-from renderer.workers import WorkerPool
+from renderer.whitted import view_of
+from renderer.workers import WorkerPool, Workers
 
 DEFAULT_MAP_CACHE_BYTES = 256 << 20
 DEFAULT_STORE_BYTES = 512 << 20
@@ -84,42 +86,59 @@ class Renderer:
 
     def cell_map(self, display: Display, quality: Quality, gaze: Gaze) -> tuple[CellMap, bool]:
         """The cell map for a gaze, and whether it came from the cache."""
-        numbered, cached = self._map(display, quality, gaze)
+        numbered, cached = self._map(display, quality, gaze, self._pool)
         return numbered.cells, cached
 
-    def render(self, prepared: PreparedScene, request: FrameRequest) -> Frame:
+    def render(self, prepared: PreparedScene, request: FrameRequest, abandon: threading.Event | None = None) -> Frame:
         """Render one frame.
 
-        The same request gives the same bytes, on any number of threads and whatever was rendered before.
+        The same request gives the same bytes, on any number of threads and whatever was rendered before; but
+        one of a limited number of `samples` shows what further samples earlier frames have left.
+
+        Args:
+            prepared: the scene.
+            request: the frame.
+            abandon: set it, from another thread, to give up the frame.
+
+        Raises:
+            Abandoned: within about a block of rays after `abandon` is set. What was traced by then is kept.
         """
         began = time.perf_counter()
-        numbered, cached = self._map(request.display, request.quality, request.gaze)
+        quality = request.quality
+        wanted = quality.samples_per_cell if request.samples is None else request.samples
+        pool = self._pool.until(abandon)
+        numbered, cached = self._map(request.display, quality, request.gaze, pool)
+        cells, slots = numbered.cells, numbered.slots
         mapped = time.perf_counter()
-        store = self._store(prepared, request, numbered)
-        with store.lock:
-            traced, rays, rejected = self._trace_missing(prepared, request, numbered, store)
+        view = view_of(prepared, request.camera or prepared.scene.camera, request.display)
+        with self._store(prepared, request, numbered).held(abandon) as samples:
+            growth = grow(prepared, view, cells, slots, samples, quality, wanted, pool)
             done = time.perf_counter()
-            rebuild = reconstruct_smooth if request.quality.reconstruction == "smooth" else reconstruct
-            pixels = rebuild(
-                numbered.cells, numbered.slots, store.samples, prepared.scene.exposure, request.linear, self._pool
-            )
-            errors = standard_errors(
-                request.display, request.gaze, numbered.cells, numbered.slots, store.samples, self._pool
+            rebuild = reconstruct_smooth if quality.reconstruction == "smooth" else reconstruct
+            pixels = rebuild(cells, slots, samples, prepared.scene.exposure, request.linear, pool)
+            rms, foveal_rms = (
+                standard_errors(request.display, request.gaze, cells, slots, samples, pool)
+                if growth.fewest >= 2
+                else (None, None)
             )
         finished = time.perf_counter()
         cost = FrameCost(
-            map=request.quality.map,
-            cells=numbered.cells.cells,
-            bucket_px=request.quality.gaze_bucket_px,
+            map=quality.map,
+            cells=cells.cells,
+            bucket_px=quality.gaze_bucket_px,
             map_cached=cached,
-            samples_per_cell=request.quality.samples_per_cell,
-            cells_traced=traced,
-            cells_reused=numbered.cells.cells - traced,
-            rays=rays,
+            samples_per_cell=wanted,
+            samples_traced=growth.samples,
+            mean_samples=growth.held / cells.cells,
+            acuity_scale=quality.acuity.scale,
+            deadline_met=None,
+            cells_traced=growth.cells,
+            cells_reused=cells.cells - growth.cells,
+            rays=growth.rays,
             effects=prepared.plan.names,
-            rms_error=errors[0],
-            foveal_rms_error=errors[1],
-            rejected_samples=rejected,
+            rms_error=rms,
+            foveal_rms_error=foveal_rms,
+            rejected_samples=growth.rejected,
             time_ms=StageTimes(1e3 * (mapped - began), 1e3 * (done - mapped), 1e3 * (finished - done)),
         )
         return Frame(pixels, cost)
@@ -138,12 +157,12 @@ class Renderer:
                     self.render(scene, FrameRequest(Gaze(1e4, 16.0), display, None, quality, linear))
         eccentricity_deg(display, Gaze(0.0, 0.0))
 
-    def _map(self, display: Display, quality: Quality, gaze: Gaze) -> tuple[NumberedMap, bool]:
+    def _map(self, display: Display, quality: Quality, gaze: Gaze, pool: Workers) -> tuple[NumberedMap, bool]:
         bucket = GazeBucket(0.0, 0.0, 0) if quality.map == "full" else bucket_of(gaze, quality.gaze_bucket_px)
         acuity = None if quality.map == "full" else quality.acuity
 
         def build() -> NumberedMap:
-            cells = build_cell_map(quality.map, display, quality.acuity, bucket, self._pool)
+            cells = build_cell_map(quality.map, display, quality.acuity, bucket, pool)
             return NumberedMap(cells, slots_of(cells))
 
         return self.map_cache.get((quality.map, display, acuity, bucket), build)
@@ -161,37 +180,3 @@ class Renderer:
             numbered.identity if quality.map == "scanline" else None,
         )
         return self.store_cache.get(key, lambda: SampleStore(slots_needed(numbered.cells)))[0]
-
-    def _trace_missing(
-        self, prepared: PreparedScene, request: FrameRequest, numbered: NumberedMap, store: SampleStore
-    ) -> tuple[int, RayCounts, int]:
-        """Trace the cells the store lacks: their number, the rays and the rejected samples."""
-        quality = request.quality
-        samples = quality.samples_per_cell
-        cells = numbered.cells
-        found = np.zeros(cells.cells, dtype=np.int32)
-        missing = found[: missing_cells(store.samples, numbered.slots, samples, found)]
-        view = view_of(prepared, request.camera or prepared.scene.camera, request.display)
-        each = max(1, block_rays(prepared) // samples)
-        blocks = -(-len(missing) // each)
-        counts: list[RayCounts] = [RayCounts()] * blocks
-        rejected = [0] * blocks
-
-        def trace(block: int) -> None:
-            chosen = missing[block * each : (block + 1) * each]
-            radiance, counts[block] = trace_cells(
-                prepared, view, Cells(cells.x, cells.y, cells.side, chosen), quality, 0, samples
-            )
-            rejected[block] = add_samples(store.samples, numbered.slots, chosen, radiance, samples)
-
-        self._pool.run(trace, blocks)
-        return len(missing), _total(counts), sum(rejected)
-
-
-def _total(counts: list[RayCounts]) -> RayCounts:
-    return RayCounts(
-        primary=sum(count.primary for count in counts),
-        shadow=sum(count.shadow for count in counts),
-        reflection=sum(count.reflection for count in counts),
-        refraction=sum(count.refraction for count in counts),
-    )

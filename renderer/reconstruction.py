@@ -9,7 +9,7 @@ from renderer.cellmap import CellMap
 from renderer.kernel import kernel
 from renderer.store import Samples
 from renderer.tonemap import FIRST_CODES, THRESHOLDS, srgb_code
-from renderer.workers import WorkerPool
+from renderer.workers import Workers
 
 STRIP_ROWS = 64
 """Rows gathered together [px]."""
@@ -19,7 +19,7 @@ STRIP_CELLS = 32_768
 
 
 def reconstruct(
-    cell_map: CellMap, slots: NDArray[np.int64], samples: Samples, exposure: float, linear: bool, pool: WorkerPool
+    cell_map: CellMap, slots: NDArray[np.int64], samples: Samples, exposure: float, linear: bool, pool: Workers
 ) -> NDArray[np.uint8] | NDArray[np.float32]:
     """The frame, each pixel the mean of its cell's samples (the paper's reconstruction, `nearest`).
 

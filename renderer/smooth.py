@@ -16,14 +16,14 @@ from renderer.kernel import formula, kernel
 from renderer.reconstruction import STRIP_CELLS, mean_radiance
 from renderer.store import Samples
 from renderer.tonemap import FIRST_CODES, THRESHOLDS, srgb_code
-from renderer.workers import WorkerPool
+from renderer.workers import Workers
 
 DISPLAY_WHITE = np.float32(1.0)
 """Brightest exposed value: a cell that is clipped blends as white, else a lamp would swallow its surroundings."""
 
 
 def reconstruct_smooth(
-    cell_map: CellMap, slots: NDArray[np.int64], samples: Samples, exposure: float, linear: bool, pool: WorkerPool
+    cell_map: CellMap, slots: NDArray[np.int64], samples: Samples, exposure: float, linear: bool, pool: Workers
 ) -> NDArray[np.uint8] | NDArray[np.float32]:
     """The frame, the means of cells interpolated over the screen.
 

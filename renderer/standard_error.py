@@ -14,7 +14,7 @@ from renderer.eccentricity import EyeGeometry, eye_geometry
 from renderer.gaze import Gaze, GazeBucket
 from renderer.kernel import kernel
 from renderer.store import LUMINANCE, Samples
-from renderer.workers import WorkerPool
+from renderer.workers import Workers
 
 FOVEA_DEG = 2.5
 """Half-angle of the fovea around the gaze [deg]."""
@@ -24,22 +24,20 @@ CHUNK_CELLS = 65_536
 
 
 def standard_errors(
-    display: Display, gaze: Gaze, cell_map: CellMap, slots: NDArray[np.int64], samples: Samples, pool: WorkerPool
-) -> tuple[float | None, float | None]:
+    display: Display, gaze: Gaze, cell_map: CellMap, slots: NDArray[np.int64], samples: Samples, pool: Workers
+) -> tuple[float, float | None]:
     """Root mean square over area of the standard error of the cells' linear luminance.
 
     Args:
         display, gaze: where the fovea is.
         cell_map, slots: the cells and their slots in `samples`.
-        samples: sums and counts.
+        samples: sums and counts, every cell with at least two samples.
         pool: threads; the sums do not depend on their number.
 
     Returns:
-        Over the screen, and over cells whose centre is within 2.5 deg of the gaze. None where cells have
-        fewer than two samples, or where there is no such cell.
+        Over the screen, and over cells whose centre is within 2.5 deg of the gaze; None where there is no
+        such cell.
     """
-    if cell_map.cells == 0 or samples.number[slots[0]] < 2:
-        return None, None
     eye = eye_geometry(display, Acuity(), GazeBucket(gaze.x, gaze.y, 0))
     chunks = -(-cell_map.cells // CHUNK_CELLS)
     sums = np.zeros((chunks, 4))

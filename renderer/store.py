@@ -8,12 +8,15 @@ in two frames ends with the same bits as one that got them in one.
 from __future__ import annotations
 
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from renderer.cellmap import CellMap
+from renderer.frame import Abandoned
 from renderer.kernel import kernel
 
 LUMINANCE = (0.2126, 0.7152, 0.0722)
@@ -24,6 +27,9 @@ BRIGHTEST = np.float32(1e16)
 
 BYTES_A_SLOT = 3 * 4 + 4 + 4
 """Size of one cell's record [byte]."""
+
+ABANDON_POLL_S = 0.005
+"""How often whoever waits for a store looks whether to go on waiting [s]."""
 
 
 class Samples(NamedTuple):
@@ -41,16 +47,31 @@ class Samples(NamedTuple):
 
 
 class SampleStore:
-    """Samples of one view, one render at a time: hold `lock` from `missing` to the last read."""
+    """Samples of one view, for one render at a time."""
 
     def __init__(self, slots: int) -> None:
         """Room for `slots` cells; memory is taken from the system only where it is written."""
-        self.lock = threading.Lock()
+        self._lock = threading.Lock()
         self.samples = Samples(
             total=np.zeros((slots, 3), dtype=np.float32),
             square=np.zeros(slots, dtype=np.float32),
             number=np.zeros(slots, dtype=np.int32),
         )
+
+    @contextmanager
+    def held(self, abandon: threading.Event | None) -> Iterator[Samples]:
+        """Keep other renders out from the first look at the samples to the last.
+
+        Raises:
+            Abandoned: if `abandon` is set before the others have left.
+        """
+        while not self._lock.acquire(timeout=-1 if abandon is None else ABANDON_POLL_S):
+            if abandon is not None and abandon.is_set():
+                raise Abandoned
+        try:
+            yield self.samples
+        finally:
+            self._lock.release()
 
     @property
     def nbytes(self) -> int:
@@ -115,39 +136,51 @@ def _find_slots(
 
 
 @kernel
-def missing_cells(samples: Samples, slots: NDArray[np.int64], wanted: int, missing: NDArray[np.int32]) -> int:
-    """List the cells that have no samples yet; those that have, have `wanted`.
+def missing_cells(
+    samples: Samples, slots: NDArray[np.int64], wanted: int, missing: NDArray[np.int32], first: NDArray[np.int32]
+) -> tuple[int, int, int]:
+    """List the cells that have fewer than `wanted` samples.
 
     Args:
         samples: the store.
         slots: (n,) int64 slot of each cell.
         wanted: samples a cell.
-        missing: (n,) int32, the first of them written.
+        missing: (n,) int32, the first of them written: the cells.
+        first: (n,) int32, as many written: how many samples each of them has.
 
     Returns:
-        How many are missing.
+        How many are missing, how many samples there are in all cells, and the fewest in any.
     """
     count = samples.number
-    found = 0
+    found = held = 0
+    fewest = np.int32(2**31 - 1)
     for cell in range(len(slots)):
-        if count[slots[cell]] != wanted:
+        number = count[slots[cell]]
+        held += number
+        fewest = min(fewest, number)
+        if number < wanted:
             missing[found] = cell
+            first[found] = number
             found += 1
-    return found
+    return found, held, int(fewest)
 
 
 @kernel
 def add_samples(
-    samples: Samples, slots: NDArray[np.int64], cells: NDArray[np.int32], radiance: NDArray[np.float32], each: int
+    samples: Samples,
+    slots: NDArray[np.int64],
+    cells: NDArray[np.int32],
+    until: NDArray[np.int32],
+    radiance: NDArray[np.float32],
 ) -> int:
-    """Add the radiance of new samples to their cells, in the order of the samples.
+    """Add the radiance of the next samples of some cells, in the order of the samples.
 
     Args:
         samples: the store.
         slots: (n,) int64 slot of each cell of the map.
         cells: (c,) int32 cells that were sampled.
-        radiance: (c * each, 3) float32, the samples of a cell after one another.
-        each: samples a cell.
+        until: (c,) int32 samples each of them has then.
+        radiance: (samples, 3) float32, the samples of a cell after one another.
 
     Returns:
         How many samples were not a number or negative, and count as black.
@@ -159,7 +192,7 @@ def add_samples(
         slot = slots[cells[index]]
         red, green, blue = total[slot, 0], total[slot, 1], total[slot, 2]
         square = squares[slot]
-        for _ in range(each):
+        for _ in range(count[slot], until[index]):
             r, g, b = radiance[row, 0], radiance[row, 1], radiance[row, 2]
             row += 1
             if not (r >= 0.0 and g >= 0.0 and b >= 0.0):
@@ -173,5 +206,5 @@ def add_samples(
             square += luminance * luminance
         total[slot, 0], total[slot, 1], total[slot, 2] = red, green, blue
         squares[slot] = square
-        count[slot] += each
+        count[slot] = until[index]
     return rejected

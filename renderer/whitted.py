@@ -15,7 +15,7 @@ from renderer.lighting import add_unblocked
 from renderer.prepared import PreparedScene
 from renderer.quality import Quality
 from renderer.rays import Rays, first_shadow_rays, make_rays, make_shadow_rays, some_rays
-from renderer.sampling import camera_rays, lattice_step
+from renderer.sampling import camera_rays, lattice_order, lattice_step
 from renderer.shading import CHILDREN, COUNTERS, REFLECTIONS, REFRACTIONS, SHADOWS, shade
 
 BLOCK_RAYS = 8192
@@ -49,12 +49,15 @@ class Cells(NamedTuple):
     Attributes:
         x, y, side: (n,) int32 cell vector of the whole map.
         chosen: (c,) int32 cells to sample.
+        first, until: (c,) int32 samples first .. until - 1 of each.
     """
 
     x: NDArray[np.int32]
     y: NDArray[np.int32]
     side: NDArray[np.int32]
     chosen: NDArray[np.int32]
+    first: NDArray[np.int32]
+    until: NDArray[np.int32]
 
 
 class _Scratch:
@@ -89,28 +92,28 @@ def block_rays(prepared: PreparedScene) -> int:
 
 
 def trace_cells(
-    prepared: PreparedScene, view: View, cells: Cells, quality: Quality, first_sample: int, samples: int
+    prepared: PreparedScene, view: View, cells: Cells, quality: Quality
 ) -> tuple[NDArray[np.float32], RayCounts]:
     """Radiance of camera samples of some cells.
 
     Args:
         prepared: the scene.
         view: the camera.
-        cells: which cells; their number times `samples` should not exceed `block_rays(prepared)` unless
-            it is a single cell.
-        quality: antialiasing and depth.
-        first_sample, samples: samples first_sample .. first_sample + samples - 1 of each.
+        cells: which cells and samples; these should not exceed `block_rays(prepared)` unless it is a
+            single cell.
+        quality: samples a cell gets in the end, antialiasing and depth.
 
     Returns:
-        (cells * samples, 3) float32 radiance, the samples of a cell after one another, and the rays traced.
+        (samples, 3) float32 radiance, the samples of a cell after one another, and the rays traced.
     """
-    n = len(cells.chosen) * samples
+    n = int((cells.until - cells.first).sum())
     block = block_rays(prepared)
     scratch = _scratch(max(block, n), block * len(prepared.surfaces.lights))
-    step = lattice_step(first_sample + samples) if quality.antialiasing == "regular" else 0
+    points = quality.samples_per_cell
+    step = lattice_step(points) if quality.antialiasing == "regular" else 0
     camera_rays(
         view.frame, view.origin, view.width, view.height, cells.x, cells.y, cells.side, cells.chosen,
-        first_sample, samples, step, scratch.level(0),
+        cells.first, cells.until, points, step, lattice_order(points), scratch.level(0),
     )  # fmt: skip
     radiance = np.zeros((n, 3), dtype=np.float32)
     counts = _follow(prepared, scratch, n, block, quality.max_depth, radiance)

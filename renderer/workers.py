@@ -10,18 +10,36 @@ import os
 import threading
 from collections import deque
 from collections.abc import Callable
+from typing import Protocol
+
+from renderer.frame import Abandoned
+
+
+class Workers(Protocol):
+    """Whoever runs the blocks of a job."""
+
+    def run(self, task: Callable[[int], None], count: int) -> None:
+        """Call `task(0)` .. `task(count - 1)` and return when all have finished."""
 
 
 class _Job:
     """Blocks 0 .. count-1 of one task; `taken` and `finished` are guarded by the pool's condition."""
 
-    def __init__(self, task: Callable[[int], None], count: int) -> None:
+    def __init__(self, task: Callable[[int], None], count: int, abandon: threading.Event | None) -> None:
         self.task = task
         self.count = count
+        self.abandon = abandon
         self.taken = 0
         self.finished = 0
         self.error: BaseException | None = None
         self.done = threading.Event()
+
+    def drop(self, error: BaseException) -> None:
+        """Begin no further block; `error` is raised once those already begun have finished."""
+        self.error = self.error or error
+        self.count = self.taken
+        if self.finished == self.count:
+            self.done.set()
 
 
 class WorkerPool:
@@ -40,15 +58,23 @@ class WorkerPool:
         for member in self._members:
             member.start()
 
-    def run(self, task: Callable[[int], None], count: int) -> None:
+    def run(self, task: Callable[[int], None], count: int, abandon: threading.Event | None = None) -> None:
         """Call `task(0)` .. `task(count - 1)` on the workers and return when all have finished.
 
         The first exception of a block stops the blocks not yet begun and is raised here.
         Must not be called from a block.
+
+        Args:
+            task: does one block.
+            count: number of blocks.
+            abandon: once it is set, no further block is begun.
+
+        Raises:
+            Abandoned: when those that were begun have finished, if `abandon` kept others from being begun.
         """
         if count == 0:
             return
-        job = _Job(task, count)
+        job = _Job(task, count, abandon)
         with self._changed:
             if self._closed:
                 raise RuntimeError("the worker pool is closed")
@@ -57,6 +83,10 @@ class WorkerPool:
         job.done.wait()
         if job.error is not None:
             raise job.error
+
+    def until(self, abandon: threading.Event | None) -> Workers:
+        """The same workers for jobs that end as soon as `abandon` is set."""
+        return self if abandon is None else _WorkersUntil(self, abandon)
 
     def close(self, *, abandon: bool = False) -> None:
         """Let the jobs that were begun finish, then end the threads.
@@ -67,11 +97,7 @@ class WorkerPool:
         with self._changed:
             self._closed = True
             while abandon and self._jobs:
-                job = self._jobs.popleft()
-                job.error = job.error or RuntimeError("the worker pool was closed before the job was done")
-                job.count = job.taken
-                if job.finished == job.count:
-                    job.done.set()
+                self._jobs.popleft().drop(RuntimeError("the worker pool was closed before the job was done"))
             self._changed.notify_all()
         for member in self._members:
             member.join()
@@ -91,6 +117,9 @@ class WorkerPool:
                     return False
                 self._changed.wait()
             job = self._jobs.popleft()
+            if job.abandon is not None and job.abandon.is_set():
+                job.drop(Abandoned())
+                return True
             block = job.taken
             job.taken += 1
             if job.taken < job.count:
@@ -110,6 +139,17 @@ class WorkerPool:
             if job.finished == job.count:
                 job.done.set()
         return True
+
+
+class _WorkersUntil:
+    """A pool whose jobs end as soon as an event is set."""
+
+    def __init__(self, pool: WorkerPool, abandon: threading.Event) -> None:
+        self._pool = pool
+        self._abandon = abandon
+
+    def run(self, task: Callable[[int], None], count: int) -> None:
+        self._pool.run(task, count, self._abandon)
 
 
 def available_cores() -> int:

@@ -259,6 +259,8 @@ def _spent(cost: FrameCost) -> dict[str, object]:
     return {
         "map": {"kind": cost.map, "cells": cost.cells, "bucket_px": cost.bucket_px, "cached": cost.map_cached},
         "samples_per_cell": cost.samples_per_cell,
+        "samples": round(cost.mean_samples, 3),
+        "acuity_scale": cost.acuity_scale,
         "cells_traced": cost.cells_traced,
         "cells_reused": cost.cells_reused,
         "rays": asdict(cost.rays),

@@ -213,6 +213,8 @@ def cost_record(frame: Frame, request: FrameRequest, extra_ms: dict[str, float])
         "gaze": {"x": request.gaze.x, "y": request.gaze.y},
         "map": {"kind": cost.map, "cells": cost.cells, "bucket_px": cost.bucket_px, "cached": cost.map_cached},
         "samples_per_cell": cost.samples_per_cell,
+        "samples": round(cost.mean_samples, 3),
+        "acuity_scale": cost.acuity_scale,
         "cells_traced": cost.cells_traced,
         "cells_reused": cost.cells_reused,
         "rays": {

@@ -171,7 +171,8 @@ def test_costs_add_up(scene: PreparedScene, tiling: str, samples: int) -> None:
         cells = fresh.cell_map(SCREEN, quality, Gaze(*gaze))[0]
         assert (cost.map, cost.samples_per_cell, cost.bucket_px) == (tiling, samples, 16)
         assert cost.cells == cells.cells == cost.cells_traced + cost.cells_reused
-        assert cost.rays.primary == samples * cost.cells_traced
+        assert cost.rays.primary == cost.samples_traced == samples * cost.cells_traced
+        assert (cost.mean_samples, cost.acuity_scale, cost.deadline_met) == (samples, 16.0, None)
         assert cost.rays.total == sum(dataclasses.astuple(cost.rays))
         assert cost.rejected_samples == 0
         assert cost.effects == ("textures", "shadows", "reflection", "refraction")

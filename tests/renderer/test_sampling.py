@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from renderer.camera import Camera, ViewFrame
 from renderer.pipeline import Renderer
 from renderer.rays import make_rays
-from renderer.sampling import camera_rays, lattice_step
+from renderer.sampling import camera_rays, lattice_order, lattice_step
 from renderer.scene import Scene
 from tests.renderer.drawing import lamp, quad, shoot
 
@@ -31,15 +31,22 @@ def places(
     *,
     first: int = 0,
     regular: bool = False,
+    points: int | None = None,
     screen: tuple[int, int] = (SCREEN_PX, SCREEN_PX),
 ) -> NDArray[np.float64]:
-    """(cells, samples, 2) places of the camera rays of (x, y, side) cells, in pixels from the cell's corner."""
+    """(cells, samples, 2) places of the camera rays of (x, y, side) cells, in pixels from the cell's corner.
+
+    Of samples first .. first + samples - 1 of `points`, or of no more than that.
+    """
     x, y, side = (np.array(column, dtype=np.int32) for column in zip(*cells, strict=True))
     rays = make_rays(len(cells) * samples)
     shifted = PIXEL_VIEW._replace(corner=np.array([-float(x[0]), -float(y[0]), 1.0]))
-    step = lattice_step(first + samples) if regular else 0
+    points = first + samples if points is None else points
+    step, order = lattice_step(points) if regular else 0, lattice_order(points)
     chosen = np.arange(len(cells), dtype=np.int32)
-    camera_rays(shifted, np.zeros(3, np.float32), *screen, x, y, side, chosen, first, samples, step, rays)
+    since, until = np.full_like(chosen, first), np.full_like(chosen, first + samples)
+    origin = np.zeros(3, np.float32)
+    camera_rays(shifted, origin, *screen, x, y, side, chosen, since, until, points, step, order, rays)
     direction = rays.direction.astype(np.float64).reshape(len(cells), samples, 3)
     corner = np.stack([x - x[0], y - y[0]], axis=1)[:, None]
     return direction[..., :2] / direction[..., 2:] - corner
@@ -132,6 +139,35 @@ def test_regular_samples_keep_apart() -> None:
         inside = places([(0, 0, 1)], samples, regular=True)[0]
         apart = np.linalg.norm(inside[:, None] - inside[None], axis=2) + 9 * np.eye(samples)
         assert apart.min() > 0.5 / math.sqrt(samples)
+
+
+@pytest.mark.parametrize("points", [2, 8, 13, 16, 32, 100])
+def test_the_first_of_many_regular_samples_are_spread_over_the_cell(points: int) -> None:
+    """No gap between the columns of the first n is wider than three times an even one."""
+    for samples in range(1, points + 1):
+        inside = np.sort(places([(0, 0, 1)], samples, regular=True, points=points)[0, :, 0])
+        gaps = np.diff(np.append(inside, inside[0] + 1))
+        assert gaps.max() <= 3 / samples + 1e-6
+
+
+def test_regular_samples_taken_in_parts_are_those_taken_at_once() -> None:
+    cell = [(5, 7, 3)]
+    whole = places(cell, 12, regular=True)
+    parts = [places(cell, n, first=first, regular=True, points=12) for first, n in ((0, 1), (1, 6), (7, 5))]
+    np.testing.assert_array_equal(np.concatenate(parts, axis=1), whole)
+
+
+def test_cells_of_one_call_may_be_sampled_from_different_samples_on() -> None:
+    x = y = np.array([0, 0], np.int32)
+    side = np.array([4, 4], np.int32)
+    rays, cells = make_rays(5), np.array([1, 0], np.int32)
+    camera_rays(
+        PIXEL_VIEW, np.zeros(3, np.float32), SCREEN_PX, SCREEN_PX, x, y, side, cells,
+        np.array([2, 7], np.int32), np.array([5, 9], np.int32), 9, 0, 1, rays,
+    )  # fmt: skip
+    seen = rays.direction[:, :2] / rays.direction[:, 2:]
+    np.testing.assert_allclose(seen, places([(0, 0, 4)], 9)[0, [2, 3, 4, 7, 8]], rtol=1e-5)
+    assert rays.sample.tolist() == [0, 1, 2, 3, 4]
 
 
 def test_h51_the_error_of_an_edge_falls_with_the_root_of_the_samples() -> None:

@@ -10,6 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
+from renderer.frame import Abandoned
 from renderer.workers import WorkerPool, available_cores
 
 PATIENCE_S = 30.0
@@ -225,6 +226,49 @@ def test_a_pool_can_be_closed_without_waiting_for_more_than_the_blocks_in_work()
             job.result(PATIENCE_S)
     assert 2 <= len(begun) < LONG
     assert sorted(ended_when_told) == sorted(begun)
+
+
+def test_a_job_that_is_abandoned_ends_with_the_blocks_in_work() -> None:
+    pool = WorkerPool(2)
+    abandon, both_begun, go_on = threading.Event(), threading.Barrier(3), threading.Event()
+    begun: list[int] = []
+    ended: list[int] = []
+
+    def work(block: int) -> None:
+        begun.append(block)
+        both_begun.wait(PATIENCE_S)
+        assert go_on.wait(PATIENCE_S)
+        ended.append(block)
+
+    with ThreadPoolExecutor(1) as caller:
+        job = caller.submit(pool.until(abandon).run, work, LONG)
+        both_begun.wait(PATIENCE_S)
+        abandon.set()
+        go_on.set()
+        assert isinstance(job.exception(PATIENCE_S), Abandoned)
+    assert sorted(begun) == sorted(ended) == [0, 1]
+    pool.close()
+
+
+def test_an_abandoned_job_leaves_the_others_alone(pool: WorkerPool) -> None:
+    abandon = threading.Event()
+    blocks: list[int] = []
+    with ThreadPoolExecutor(2) as callers:
+        given_up = callers.submit(pool.until(abandon).run, lambda _: abandon.set(), LONG)
+        working = callers.submit(pool.run, blocks.append, 200)
+        assert isinstance(given_up.exception(PATIENCE_S), Abandoned)
+        working.result(PATIENCE_S)
+    assert sorted(blocks) == list(range(200))
+    with pytest.raises(Abandoned):
+        pool.until(abandon).run(blocks.append, 1)
+    pool.until(threading.Event()).run(blocks.append, 3)
+    pool.until(None).run(blocks.append, 3)
+    assert len(blocks) == 206
+
+
+def test_a_job_whose_last_block_was_begun_is_done_all_the_same(single: WorkerPool) -> None:
+    abandon = threading.Event()
+    single.until(abandon).run(lambda _: abandon.set(), 1)
 
 
 def test_a_closed_pool_takes_no_job() -> None:

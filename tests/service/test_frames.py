@@ -76,15 +76,15 @@ def test_the_header_says_what_is_shown_and_what_it_cost(client: httpx.Client) ->
     header = header_of(reply)
     assert reply.headers["gazetrace-frame"].isascii()
     assert list(header) == [
-        "frame", "scene", "width", "height", "format", "gaze", "map", "samples_per_cell", "cells_traced",
-        "cells_reused", "rays", "effects", "error", "timing_ms", "service_time_ns",
+        "frame", "scene", "width", "height", "format", "gaze", "map", "samples_per_cell", "samples", "acuity_scale",
+        "cells_traced", "cells_reused", "rays", "effects", "error", "timing_ms", "service_time_ns",
     ]  # fmt: skip
     assert (header["scene"], header["width"], header["height"], header["format"]) == ("spheres", 96, 54, "png")
     assert header["gaze"] == {"x": 48, "y": 13.5}
     assert header["map"]["kind"] == "aligned"
     assert header["map"]["bucket_px"] == 16
     assert header["map"]["cells"] == header["cells_traced"] + header["cells_reused"]
-    assert header["samples_per_cell"] == 2
+    assert (header["samples_per_cell"], header["samples"], header["acuity_scale"]) == (2, 2, 1)
     assert set(header["rays"]) == {"primary", "shadow", "reflection", "refraction"}
     assert header["rays"]["primary"] == 2 * header["cells_traced"]
     assert {"reflection", "refraction", "shadows"} <= set(header["effects"])
