@@ -43,7 +43,7 @@ def plan_effects(scene: Scene) -> EffectPlan:
     users = _material_users(scene)
     calls: dict[str, Callable[[Material], bool]] = {
         "textures": lambda material: material.diffuse_texture is not None and material.diffuse != BLACK,
-        "specular": lambda material: material.specular != BLACK and bool(_lit(scene)),
+        "specular": lambda material: has_highlight(material) and bool(_lit(scene)),
         "shadows": lambda material: _takes_light(material) and bool(_shadow_lights(scene)) and _casters(scene) > 0,
         "reflection": lambda material: material.reflection != BLACK or _is_boundary(material),
         "refraction": lambda material: material.transmission != BLACK,
@@ -80,8 +80,13 @@ def _casters(scene: Scene) -> int:
     return meshes + sum(1 for sphere in scene.spheres if sphere.casts_shadows)
 
 
+def has_highlight(material: Material) -> bool:
+    """Whether light makes a highlight on it: Ashikhmin and Shirley's base always has one at grazing angles."""
+    return material.specular != BLACK or material.base == "ashikhmin-shirley"
+
+
 def _takes_light(material: Material) -> bool:
-    return material.diffuse != BLACK or material.specular != BLACK
+    return material.diffuse != BLACK or has_highlight(material)
 
 
 def _is_boundary(material: Material) -> bool:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.finish import Finish
 from renderer.kernel import formula, kernel
 from renderer.rays import ShadowRays
 from renderer.reflectance import reflectance
@@ -18,15 +19,13 @@ from renderer.surface import OFFSET_ULPS, Surface
 def _light_to_eye(
     s: Surface,
     material: Any,
-    kr: float,
-    kg: float,
-    kb: float,
+    finish: Finish,
     light: Any,
     vx: float,
     vy: float,
     vz: float,
 ) -> tuple[float, float, float, float]:
-    """Radiance that a surface of diffuse albedo (kr, kg, kb) sends towards (vx, vy, vz) of one light,
+    """Radiance that a surface sends towards (vx, vy, vz) of one light,
     nothing being in between, and 1 over the light's distance; 0 for a light behind the surface or in it.
     """
     tx, ty, tz = light.x - s.px, light.y - s.py, light.z - s.pz
@@ -38,7 +37,7 @@ def _light_to_eye(
     cosine = tx * s.nx + ty * s.ny + tz * s.nz
     if cosine <= 0.0:
         return 0.0, 0.0, 0.0, 0.0
-    red, green, blue = reflectance(s, material, kr, kg, kb, cosine, tx, ty, tz, vx, vy, vz)
+    red, green, blue = reflectance(s, material, finish, cosine, tx, ty, tz, vx, vy, vz)
     falloff = inverse * inverse
     return red * (light.red * falloff), green * (light.green * falloff), blue * (light.blue * falloff), inverse
 
@@ -47,9 +46,7 @@ def _light_to_eye(
 def light_from_points(
     s: Surface,
     material: Any,
-    kr: float,
-    kg: float,
-    kb: float,
+    finish: Finish,
     wr: float,
     wg: float,
     wb: float,
@@ -67,7 +64,7 @@ def light_from_points(
     Args:
         s: the surface.
         material: its row of the material table.
-        kr, kg, kb: diffuse albedo, textures included.
+        finish: the material at this place.
         wr, wg, wb: share of the surface's light that reaches the eye.
         dx, dy, dz: direction of the ray that met it.
         sample: camera sample of the block.
@@ -81,7 +78,7 @@ def light_from_points(
     """
     for index in range(len(lights)):
         light = lights[index]
-        red, green, blue, inverse = _light_to_eye(s, material, kr, kg, kb, light, -dx, -dy, -dz)
+        red, green, blue, inverse = _light_to_eye(s, material, finish, light, -dx, -dy, -dz)
         red, green, blue = wr * red, wg * green, wb * blue
         if not max(red, max(green, blue)) > 0.0:
             continue

@@ -15,11 +15,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.effects import EffectPlan, plan_effects
+from renderer.direction import unit
+from renderer.effects import EffectPlan, has_highlight, plan_effects
 from renderer.errors import SceneError
 from renderer.intersection import Intersector
 from renderer.scene import Material, Mesh, Scene, Texture
 from renderer.sphere import SphereTree, build_sphere_tree
+from renderer.tangent import TANGENT, mesh_tangents
 from renderer.texture import TextureAtlas, build_atlas
 
 FACET = 32
@@ -34,7 +36,9 @@ SPECULAR = 1
 MIRROR = 2
 BOUNDARY = 4
 LIT = 8
-"""Bits of what a material calls for."""
+MICROFACETS = 256
+GRAINED = 512
+"""Bits of what a material calls for: `MICROFACETS` is the base of Ashikhmin and Shirley, `GRAINED` a tangent."""
 
 
 _COLOURS = [
@@ -44,7 +48,12 @@ _COLOURS = [
 ]
 
 MATERIAL = np.dtype(
-    [*_COLOURS, ("shininess", np.float32), ("ior", np.float32), ("picture", np.int32), ("calls", np.int32)]
+    [
+        *_COLOURS,
+        *((name, np.float32) for name in ("shininess", "ior", "exponent_u", "exponent_v")),
+        ("picture", np.int32),
+        ("calls", np.int32),
+    ]
 )
 """One material as the kernels read it; `picture` is -1 without a texture, `calls` are the bits above."""
 
@@ -59,6 +68,7 @@ class Surfaces(NamedTuple):
         facets: (m, FACET) float32, one triangle each, in two cache lines: for each of its three corners
             position, unit normal and texture coordinates; then the row of its material, 1 where the
             corner normals are not the triangle's own, its own unit normal, and its largest coordinate.
+        tangents: (m, TANGENT) float32, see `tangent`; (0, TANGENT) where no material is grained.
         spheres: analytic spheres.
         materials: (k,) MATERIAL, each that something visible has.
         lights: (l,) LIGHT, each that shines.
@@ -67,6 +77,7 @@ class Surfaces(NamedTuple):
     """
 
     facets: NDArray[np.float32]
+    tangents: NDArray[np.float32]
     spheres: SphereTree
     materials: NDArray[np.void]
     lights: NDArray[np.void]
@@ -116,7 +127,7 @@ def prepare(scene: Scene) -> PreparedScene:
     materials = _used_materials(scene)
     textures = list(dict.fromkeys(material.diffuse_texture for material in materials if material.diffuse_texture))
     row = {material: index for index, material in enumerate(materials)}
-    vertices, faces, facets, casts = _triangles(scene, row, center, scale)
+    vertices, faces, facets, tangents, casts = _triangles(scene, row, center, scale)
     spheres = build_sphere_tree(
         (np.array([sphere.center for sphere in scene.spheres]).reshape(-1, 3) - center) * scale,
         np.array([sphere.radius for sphere in scene.spheres], dtype=np.float64) * scale,
@@ -125,6 +136,7 @@ def prepare(scene: Scene) -> PreparedScene:
     )
     surfaces = Surfaces(
         facets=facets,
+        tangents=tangents,
         spheres=spheres,
         materials=_material_table(materials, textures, plan),
         textures=build_atlas(textures),
@@ -134,7 +146,7 @@ def prepare(scene: Scene) -> PreparedScene:
         ),
     )
     intersector = Intersector(vertices, faces, casts, spheres)
-    nbytes = facets.nbytes + surfaces.textures.texels.nbytes + EMBREE_BYTES_A_TRIANGLE * len(faces)
+    nbytes = facets.nbytes + tangents.nbytes + surfaces.textures.texels.nbytes + EMBREE_BYTES_A_TRIANGLE * len(faces)
     nbytes += sum(mesh.vertices.nbytes + mesh.faces.nbytes for mesh in scene.meshes)
     brightest = max(itertools.chain(scene.surroundings.zenith, scene.surroundings.horizon,
                                     *(material.emission for material in materials)))  # fmt: skip
@@ -179,16 +191,23 @@ def _material_table(materials: list[Material], textures: list[Texture], plan: Ef
         for name in ("diffuse", "specular", "emission", "reflection", "transmission"):
             for channel, value in zip(("red", "green", "blue"), getattr(material, name), strict=True):
                 table[row][f"{name}_{channel}"] = value
-        table[row]["shininess"] = material.shininess
-        table[row]["ior"] = material.ior
+        for name in ("shininess", "ior", "exponent_u", "exponent_v"):
+            table[row][name] = getattr(material, name)
         table[row]["picture"] = textures.index(material.diffuse_texture) if material.diffuse_texture else -1
         table[row]["calls"] = (
-            (SPECULAR if "specular" in plan.names and any(material.specular) else 0)
+            (SPECULAR if "specular" in plan.names and has_highlight(material) else 0)
             | (MIRROR if any(material.reflection) else 0)
             | (BOUNDARY if any(material.transmission) else 0)
-            | (LIT if any(material.diffuse) or any(material.specular) else 0)
+            | (LIT if any(material.diffuse) or has_highlight(material) else 0)
+            | (MICROFACETS if material.base == "ashikhmin-shirley" else 0)
+            | (GRAINED if _is_grained(material) else 0)
         )
     return table
+
+
+def _is_grained(material: Material) -> bool:
+    """Whether it matters for its looks where the texture coordinate u runs."""
+    return material.base == "ashikhmin-shirley" and material.exponent_u != material.exponent_v
 
 
 def _light_table(scene: Scene, plan: EffectPlan, center: NDArray[np.float64], scale: float) -> NDArray[np.void]:
@@ -202,21 +221,25 @@ def _light_table(scene: Scene, plan: EffectPlan, center: NDArray[np.float64], sc
     return table
 
 
-_Triangles = tuple[NDArray[np.float32], NDArray[np.int32], NDArray[np.float32], NDArray[np.bool_]]
+_Triangles = tuple[NDArray[np.float32], NDArray[np.int32], NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_]]
 
 
 def _triangles(scene: Scene, row: dict[Material, int], center: NDArray[np.float64], scale: float) -> _Triangles:
-    """Vertices, faces, facets and shadow flags of all meshes together."""
+    """Vertices, faces, facets, tangents and shadow flags of all meshes together."""
     meshes = [mesh for mesh in scene.meshes if len(mesh.faces)]
     vertices = [np.zeros((0, 3), dtype=np.float32)]
     faces = [np.zeros((0, 3), dtype=np.int64)]
     facets = aligned_facets(sum(len(mesh.faces) for mesh in meshes))
+    grained = any(_is_grained(mesh.material) for mesh in meshes)
+    tangents = np.zeros((len(facets) if grained else 0, TANGENT), dtype=np.float32)
     casts = np.zeros(len(facets), dtype=np.bool_)
     first_vertex = first_face = 0
     for mesh in meshes:
         local = ((mesh.vertices - center) * scale).astype(np.float32)
         part = slice(first_face, first_face + len(mesh.faces))
         _fill_facets(mesh, local, row[mesh.material], facets[part])
+        if _is_grained(mesh.material):
+            tangents[part] = mesh_tangents(mesh)
         vertices.append(local)
         faces.append(mesh.faces + first_vertex)
         casts[part] = mesh.casts_shadows
@@ -229,7 +252,8 @@ def _triangles(scene: Scene, row: dict[Material, int], center: NDArray[np.float6
         kept = aligned_facets(len(keep))
         kept[:] = facets[keep]
         facets = kept
-    return np.concatenate(vertices), np.concatenate(faces).astype(np.int32)[keep], facets, casts[keep]
+        tangents = tangents[keep] if grained else tangents
+    return np.concatenate(vertices), np.concatenate(faces).astype(np.int32)[keep], facets, tangents, casts[keep]
 
 
 def aligned_facets(count: int) -> NDArray[np.float32]:
@@ -245,11 +269,11 @@ def _fill_facets(mesh: Mesh, local: NDArray[np.float32], material: int, facets: 
     corners = np.zeros((len(mesh.faces), 3, 8), dtype=np.float32)
     corners[:, :, :3] = local[mesh.faces]
     edge = corners[:, 1:, :3].astype(np.float64) - corners[:, :1, :3]
-    own = _unit(np.cross(edge[:, 0], edge[:, 1]))[:, None, :]
+    own = unit(np.cross(edge[:, 0], edge[:, 1]))[:, None, :]
     if mesh.normals is None:
         corners[:, :, 3:6] = own
     else:
-        given = _unit(np.asarray(mesh.normals, dtype=np.float64))[mesh.faces]
+        given = unit(np.asarray(mesh.normals, dtype=np.float64))[mesh.faces]
         corners[:, :, 3:6] = np.where((given == 0.0).all(axis=2, keepdims=True), own, given)
     if mesh.uvs is not None:
         with np.errstate(over="ignore"):
@@ -263,15 +287,6 @@ def _fill_facets(mesh: Mesh, local: NDArray[np.float32], material: int, facets: 
 
 FLAT_NORMAL = 1e-6
 """Largest difference of a corner normal from the triangle's own that is rounding only."""
-
-
-def _unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Vectors of unit length; 0 for those that are 0 or not finite. Safe for any length."""
-    finite = np.where(np.isfinite(vectors).all(axis=-1, keepdims=True), vectors, 0.0)
-    largest = np.abs(finite).max(axis=-1, keepdims=True)
-    reduced = finite / np.where(largest > 0.0, largest, 1.0)
-    length = np.linalg.norm(reduced, axis=-1, keepdims=True)
-    return np.asarray(reduced / np.where(length > 0.0, length, 1.0))
 
 
 def _distinct(facets: NDArray[np.float32]) -> NDArray[np.int64]:

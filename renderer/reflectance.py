@@ -1,12 +1,16 @@
-"""How much of the light from one direction a surface sends into another (Phong)."""
+"""How much of the light from one direction a surface sends into another, by either base."""
 
 from __future__ import annotations
 
 import math
 from typing import Any
 
+import numpy as np
+
+from renderer.ashikhmin_shirley import ashikhmin_shirley, matt_share
+from renderer.finish import Finish
 from renderer.kernel import formula
-from renderer.prepared import SPECULAR
+from renderer.prepared import MICROFACETS, SPECULAR
 from renderer.surface import Surface
 
 INVERSE_PI = 1.0 / math.pi
@@ -34,9 +38,7 @@ def phong_lobe(s: Surface, lx: float, ly: float, lz: float, vx: float, vy: float
 def reflectance(
     s: Surface,
     material: Any,
-    kr: float,
-    kg: float,
-    kb: float,
+    finish: Finish,
     cosine: float,
     lx: float,
     ly: float,
@@ -50,16 +52,69 @@ def reflectance(
     Args:
         s: the surface.
         material: its row of the material table.
-        kr, kg, kb: diffuse albedo, textures included.
+        finish: the material at this place.
         cosine: of the angle between the light and the shading normal, above 0.
         lx, ly, lz: unit direction to the light.
         vx, vy, vz: direction to the eye, of unit length but for float32 rounding.
     """
+    if material.calls & MICROFACETS != 0:
+        return _microfacets(s, material, finish, lx, ly, lz, vx, vy, vz)
     matt = cosine * INVERSE_PI
-    red, green, blue = kr * matt, kg * matt, kb * matt
+    red, green, blue = finish.kr * matt, finish.kg * matt, finish.kb * matt
     if material.calls & SPECULAR != 0:
         gloss = phong_lobe(s, lx, ly, lz, vx, vy, vz, material.shininess)
-        red += material.specular_red * gloss
-        green += material.specular_green * gloss
-        blue += material.specular_blue * gloss
+        red += finish.sr * gloss
+        green += finish.sg * gloss
+        blue += finish.sb * gloss
     return red, green, blue
+
+
+@formula
+def _microfacets(
+    s: Surface,
+    material: Any,
+    finish: Finish,
+    lx: float,
+    ly: float,
+    lz: float,
+    vx: float,
+    vy: float,
+    vz: float,
+) -> tuple[float, float, float]:
+    """`reflectance` of the base of Ashikhmin and Shirley."""
+    inverse = 1.0 / math.sqrt(vx * vx + vy * vy + vz * vz)
+    gloss, schlick, matt = ashikhmin_shirley(
+        s.nx, s.ny, s.nz, finish.ux, finish.uy, finish.uz,
+        np.float64(material.exponent_u), np.float64(material.exponent_v),
+        lx, ly, lz, vx * inverse, vy * inverse, vz * inverse,
+    )  # fmt: skip
+    return (
+        gloss * (finish.sr + (1.0 - finish.sr) * schlick) + matt * (1.0 - finish.sr) * finish.kr,
+        gloss * (finish.sg + (1.0 - finish.sg) * schlick) + matt * (1.0 - finish.sg) * finish.kg,
+        gloss * (finish.sb + (1.0 - finish.sb) * schlick) + matt * (1.0 - finish.sb) * finish.kb,
+    )
+
+
+@formula
+def even_light(
+    s: Surface, material: Any, finish: Finish, dx: float, dy: float, dz: float
+) -> tuple[float, float, float]:
+    """Share of a light that comes evenly from everywhere which the surface sends back along a ray.
+
+    Phong's diffuse albedo; for Ashikhmin and Shirley the integral of the diffuse term, and for the highlight
+    what it mirrors head-on, Rs.
+
+    Args:
+        s: the surface.
+        material: its row of the material table.
+        finish: the material at this place.
+        dx, dy, dz: unit direction of the ray that met it.
+    """
+    if material.calls & MICROFACETS == 0:
+        return finish.kr, finish.kg, finish.kb
+    matt = matt_share(max(0.0, -(s.nx * dx + s.ny * dy + s.nz * dz)))
+    return (
+        finish.sr + (1.0 - finish.sr) * finish.kr * matt,
+        finish.sg + (1.0 - finish.sg) * finish.kg * matt,
+        finish.sb + (1.0 - finish.sb) * finish.kb * matt,
+    )

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from renderer.camera import Camera
 from renderer.camera_path import CameraPath
-from renderer.errors import SceneError, SettingsError, require_number
+from renderer.errors import SceneError, SettingsError, require_choice, require_number
 
 Rgb = tuple[float, float, float]
 
@@ -22,7 +22,10 @@ MAX_COORDINATE_M = 1e12
 """Largest coordinate of a scene [m]: beyond, products of three lengths leave float32 (Embree)."""
 
 MAX_SHININESS = 1e9
-"""Largest Phong exponent."""
+"""Largest exponent of a highlight."""
+
+BASES = ("phong", "ashikhmin-shirley")
+"""Models of how a surface scatters light."""
 
 MAX_RADIANCE = 1e12
 """Largest radiance or intensity a scene may state; keeps every product finite in float32."""
@@ -52,22 +55,30 @@ class Texture:
 
 @dataclass(frozen=True, slots=True)
 class Material:
-    """What a surface does with light (Phong; Whitted 1980).
+    """What a surface does with light: a base that scatters it, and effects added to the base.
 
-    Under a point light of intensity I at distance r a surface of this material sends
-    (diffuse/pi * N.L + specular * (R.V)^shininess) * I / r^2 to the eye.
+    With the base `phong` (Whitted 1980), under a point light of intensity I at distance r, a surface sends
+    (diffuse/pi * N.L + specular * (R.V)^shininess) * I / r^2 to the eye; with `ashikhmin-shirley` it sends
+    f * N.L * I / r^2, f from `ashikhmin_shirley`, which stays within what arrives. Emission, reflection,
+    transmission and textures are added to either.
 
     Attributes:
         name: for messages.
         diffuse: diffuse albedo, 0 to 1 each; multiplied by `diffuse_texture` where there is one.
-        specular: Phong highlight, 0 or more each.
-        shininess: Phong exponent, 0 to 1e9.
+        specular: highlight: with `phong` its height, 0 or more each; with `ashikhmin-shirley` the share
+            mirrored head-on, Rs, 0 to 1 each.
+        shininess: exponent of the highlight of `phong`, 0 to 1e9.
         emission: radiance sent out by itself [W/(sr m^2)], seen by rays but lighting nothing.
         reflection: mirror share, 0 to 1 each.
         transmission: share let through, 0 to 1 each; above 0 the surface is a dielectric boundary
             whose mirrored share is Fresnel's F and whose transmitted share is (1 - F) * transmission.
         ior: index of refraction inside the surface relative to outside, 0.1 to 10; 1 goes straight through.
         diffuse_texture: multiplies `diffuse`; None for none.
+        base: `phong` or `ashikhmin-shirley`.
+        exponent_u, exponent_v: exponents of the highlight of `ashikhmin-shirley` along and across the grain,
+            0 to 1e9; the grain runs along the texture coordinate u, round a sphere along its parallels. The
+            smaller the exponent, the farther the highlight stretches that way: metal brushed along u has a
+            large exponent_u and a small exponent_v.
 
     Raises:
         SettingsError: naming the field, for a value out of range.
@@ -82,18 +93,27 @@ class Material:
     transmission: Rgb = BLACK
     ior: float = 1.5
     diffuse_texture: Texture | None = None
+    base: str = "phong"
+    exponent_u: float = 100.0
+    exponent_v: float = 100.0
 
     def __post_init__(self) -> None:
         where = f"material {self.name!r}"
+        require_choice(f"{where}.base", self.base, BASES)
         for label, value, high in (
             ("diffuse", self.diffuse, 1.0),
-            ("specular", self.specular, MAX_RADIANCE),
+            ("specular", self.specular, MAX_RADIANCE if self.base == "phong" else 1.0),
             ("emission", self.emission, MAX_RADIANCE),
             ("reflection", self.reflection, 1.0),
             ("transmission", self.transmission, 1.0),
         ):
             require_rgb(f"{where}.{label}", value, high)
-        require_number(f"{where}.shininess", self.shininess, 0.0, MAX_SHININESS)
+        for label, exponent in (
+            ("shininess", self.shininess),
+            ("exponent_u", self.exponent_u),
+            ("exponent_v", self.exponent_v),
+        ):
+            require_number(f"{where}.{label}", exponent, 0.0, MAX_SHININESS)
         require_number(f"{where}.ior", self.ior, 0.1, 10.0)
 
 

@@ -31,6 +31,13 @@ specular = [2.0, 1.6, 0.8]
 shininess = 120.0
 reflection = [0.5, 0.4, 0.2]
 
+[materials.brushed_steel]
+base = "ashikhmin-shirley"         # or phong
+diffuse = [0.05, 0.05, 0.05]
+specular = [0.9, 0.9, 0.92]
+exponent_u = 800.0                 # or 100: along the grain, which follows the texture coordinate u
+exponent_v = 20.0                  # or 100: across it; a small exponent is a long highlight
+
 [materials.wood]
 diffuse = [1.0, 1.0, 1.0]          # or 1 under a texture
 diffuse_texture = "wood.png"
@@ -86,6 +93,7 @@ from renderer.framing import DEFAULT_MATERIAL, STUDIO, bounding_sphere, framed_c
 from renderer.mesh_file import MAX_TRIANGLES, read_meshes
 from renderer.placement import placed
 from renderer.scene import (
+    BASES,
     BLACK,
     MAX_COORDINATE_M,
     MAX_RADIANCE,
@@ -167,16 +175,21 @@ class _Reader:
 
     def _material(self, fields: Fields, name: str) -> Material:
         texture = self._texture(fields) if "diffuse_texture" in fields else None
+        base = fields.choice("base", BASES, _DEFAULTS.base)
+        brightest = MAX_RADIANCE if base == "phong" else 1.0
         material = Material(
             name,
             diffuse=fields.rgb("diffuse", 1.0, _DEFAULTS.diffuse if texture is None else (1.0, 1.0, 1.0)),
-            specular=fields.rgb("specular", MAX_RADIANCE, _DEFAULTS.specular),
+            specular=fields.rgb("specular", brightest, _DEFAULTS.specular),
             shininess=fields.number("shininess", 0.0, MAX_SHININESS, _DEFAULTS.shininess),
             emission=fields.rgb("emission", MAX_RADIANCE, _DEFAULTS.emission),
             reflection=fields.rgb("reflection", 1.0, _DEFAULTS.reflection),
             transmission=fields.rgb("transmission", 1.0, _DEFAULTS.transmission),
             ior=fields.number("ior", 0.1, 10.0, _DEFAULTS.ior),
             diffuse_texture=texture,
+            base=base,
+            exponent_u=fields.number("exponent_u", 0.0, MAX_SHININESS, _DEFAULTS.exponent_u),
+            exponent_v=fields.number("exponent_v", 0.0, MAX_SHININESS, _DEFAULTS.exponent_v),
         )
         fields.refuse_unknown()
         return material

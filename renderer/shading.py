@@ -7,11 +7,14 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.finish import Finish
 from renderer.fresnel import fresnel, refracted_cosine
+from renderer.grain import sphere_tangent, triangle_tangent
 from renderer.kernel import formula, kernel, prefetch
 from renderer.lighting import light_from_points
-from renderer.prepared import BOUNDARY, LIT, MIRROR, Surfaces
+from renderer.prepared import BOUNDARY, GRAINED, LIT, MIRROR, Surfaces
 from renderer.rays import Hits, Rays, ShadowRays
+from renderer.reflectance import even_light
 from renderer.surface import Surface, sphere_surface, triangle_surface
 from renderer.texture import look_up
 
@@ -78,7 +81,7 @@ def shade(
         counters: (COUNTERS,) int64, set.
     """
     # Arrays are taken out of their records once: doing it in the loop counts references for each ray.
-    facets = surfaces.facets
+    facets, tangents = surfaces.facets, surfaces.tangents
     center, radius, sphere_material = surfaces.spheres.center, surfaces.spheres.radius, surfaces.spheres.material
     materials, lights, around = surfaces.materials, surfaces.lights, surfaces.surroundings
     texels, pictures, linear = surfaces.textures.texels, surfaces.textures.pictures, surfaces.textures.linear
@@ -119,12 +122,24 @@ def shade(
             picture = pictures[material.picture]
             tr, tg, tb = look_up(texels, linear, picture.start, picture.width, picture.height, s.u, s.v)
             kr, kg, kb = kr * tr, kg * tg, kb * tb
-        radiance[sample, 0] += wr * (material.emission_red + kr * around[2, 0])
-        radiance[sample, 1] += wg * (material.emission_green + kg * around[2, 1])
-        radiance[sample, 2] += wb * (material.emission_blue + kb * around[2, 2])
+        ux, uy, uz = 0.0, 0.0, 0.0
+        if material.calls & GRAINED != 0:
+            if primitive < triangles:
+                ux, uy, uz = triangle_tangent(tangents, primitive, np.float64(hit_u[ray]), np.float64(hit_v[ray]), s)
+            else:
+                ux, uy, uz = sphere_tangent(s)
+        finish = Finish(
+            kr, kg, kb,
+            float(material.specular_red), float(material.specular_green), float(material.specular_blue),
+            ux, uy, uz,
+        )  # fmt: skip
+        ar, ag, ab = even_light(s, material, finish, dx, dy, dz)
+        radiance[sample, 0] += wr * (material.emission_red + ar * around[2, 0])
+        radiance[sample, 1] += wg * (material.emission_green + ag * around[2, 1])
+        radiance[sample, 2] += wb * (material.emission_blue + ab * around[2, 2])
         if material.calls & LIT != 0:
             n_shadows = light_from_points(
-                s, material, kr, kg, kb, wr, wg, wb, dx, dy, dz, sample, lights, radiance, shadows, n_shadows
+                s, material, finish, wr, wg, wb, dx, dy, dz, sample, lights, radiance, shadows, n_shadows
             )
         if not spawn or material.calls & (MIRROR | BOUNDARY) == 0:
             continue

@@ -21,7 +21,7 @@ def every_effect() -> Scene:
     return Scene(
         meshes=(floor,),
         spheres=(
-            Sphere((-1.0, 1.0, 0.0), 1.0, Material("mirror", reflection=(0.8, 0.8, 0.8))),
+            Sphere((-1.0, 1.0, 0.0), 1.0, Material("mirror", reflection=(0.8, 0.8, 0.8), base="ashikhmin-shirley")),
             Sphere((1.0, 1.0, 0.0), 1.0, Material("glass", diffuse=(0.0, 0.0, 0.0), transmission=(1.0, 1.0, 1.0))),
         ),
         lights=(PointLight((3.0, 8.0, 5.0), (400.0, 400.0, 400.0)),),

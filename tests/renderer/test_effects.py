@@ -15,6 +15,7 @@ LIGHTS = (light(0, 4, 0, 50.0),)
 CAMERA = Camera((0, 2, 8), (0, 0.5, 0))
 CHECKS = Texture(np.uint8([[[0] * 3, [255] * 3]]), "checks")
 SHINY = Material("shiny", specular=(0.5, 0.5, 0.5))
+METAL = Material("metal", diffuse=BLACK, specular=BLACK, base="ashikhmin-shirley")
 GHOST_FLOOR = floor(WHITE_LAMBERT, casts_shadows=False)
 
 
@@ -49,6 +50,8 @@ def test_a_matte_scene_traces_primary_rays_only(renderer: Renderer) -> None:
          {"reflection", "refraction"}),
         (Scene(meshes=(GHOST_FLOOR,), spheres=(ball(glass(1.0)),)), ("refraction",), {"refraction"}),
         (Scene(meshes=(floor(SHINY, casts_shadows=False),), lights=LIGHTS), ("specular",), set()),
+        (Scene(meshes=(floor(METAL, casts_shadows=False),), lights=LIGHTS), ("specular",), set()),
+        (Scene(meshes=(floor(METAL),)), (), set()),
         (Scene(meshes=(floor(Material(diffuse_texture=CHECKS)),)), ("textures",), set()),
         (Scene(spheres=(ball(lamp()),), lights=LIGHTS), (), set()),
         (Scene(), (), set()),

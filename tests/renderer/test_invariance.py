@@ -42,6 +42,7 @@ def everything() -> Scene:
     """All effects at once; coordinates are multiples of 1/1024."""
     checks = Texture(np.uint8([[[220] * 3, [40] * 3], [[40] * 3, [220] * 3]]))
     tiles = Material("tiles", diffuse=(0.8, 0.7, 0.6), specular=(0.2, 0.2, 0.2), diffuse_texture=checks)
+    brushed = Material("brushed", specular=(0.8,) * 3, base="ashikhmin-shirley", exponent_u=90.0, exponent_v=9.0)
     ground = floor(tiles, y=-0.5, half=2.0)
     ground = dataclasses.replace(ground, uvs=ground.uvs * 7 if ground.uvs is not None else None)
     ball = ball_mesh(Material("shiny", diffuse=(0.2, 0.4, 0.7), specular=(0.5,) * 3, reflection=(0.2,) * 3), 2, True)
@@ -52,7 +53,11 @@ def everything() -> Scene:
             dataclasses.replace(ball, vertices=vertices),
             box((-1.5, -0.5, -1.5), (-1, 0.25, -1), mirror(0.9)),
         ),
-        spheres=(Sphere((-0.375, 0, 0.25), 0.375, glass()), Sphere((0.125, -0.25, 0.75), 0.25, mirror(0.8))),
+        spheres=(
+            Sphere((-0.375, 0, 0.25), 0.375, glass()),
+            Sphere((0.125, -0.25, 0.75), 0.25, mirror(0.8)),
+            Sphere((-0.75, -0.25, 0.75), 0.25, brushed),
+        ),
         lights=(PointLight((1, 2, 1.5), (9e-8, 7e-8, 5e-8)), PointLight((-1.5, 1, 1), (2e-8, 3e-8, 4e-8))),
         surroundings=Surroundings((1e-9, 2e-9, 4e-9), (3e-9, 3e-9, 2e-9), (5e-10, 5e-10, 5e-10)),
         camera=Camera((0.25, 0.75, 3), (0, -0.125, 0), vertical_fov_deg=35),

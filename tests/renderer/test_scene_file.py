@@ -93,7 +93,8 @@ def test_the_worked_example_shows_every_field(folder: Path) -> None:
     assert {"": set(stated)} | found == expected
     fields = set().union(*stated["materials"].values())
     assert fields | {"emission"} == {
-        "diffuse", "specular", "shininess", "emission", "reflection", "transmission", "ior", "diffuse_texture"
+        "diffuse", "specular", "shininess", "emission", "reflection", "transmission", "ior", "diffuse_texture",
+        "base", "exponent_u", "exponent_v",
     }  # fmt: skip
 
 
@@ -115,6 +116,13 @@ def test_mirrored_meshes_still_face_outwards(folder: Path, scale: str) -> None:
         a, b, c = (mesh.vertices[mesh.faces[:, i]] for i in range(3))
         volume += float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6
     assert volume > 0
+
+
+def test_a_material_of_the_other_base(folder: Path) -> None:
+    text = worked_example().replace('material = "glass"', 'material = "brushed_steel"')
+    (material,) = (sphere.material for sphere in load(folder, text).spheres)
+    assert (material.base, material.exponent_u, material.exponent_v) == ("ashikhmin-shirley", 800.0, 20.0)
+    assert material.specular == (0.9, 0.9, 0.92)
 
 
 def test_the_files_own_materials_and_their_replacement(folder: Path) -> None:
@@ -200,7 +208,19 @@ def test_what_is_given_is_taken(folder: Path) -> None:
             "[materials.red]\ndiffuse = [2, 0, 0]",
             "vase/scene.toml: materials.red.diffuse[0]: expected a number in [0, 1]",
         ),
-        ("[materials.red]\ncolor = 1", "vase/scene.toml: materials.red.color: expected one of the fields diffuse, "),
+        ("[materials.red]\ncolor = 1", "vase/scene.toml: materials.red.color: expected one of the fields base, "),
+        (
+            "[materials.red]\nbase = 'lambert'",
+            "vase/scene.toml: materials.red.base: expected one of phong, ashikhmin-shirley, found 'lambert'",
+        ),
+        (
+            "[materials.red]\nbase = 'ashikhmin-shirley'\nspecular = [2, 0, 0]",
+            "vase/scene.toml: materials.red.specular[0]: expected a number in [0, 1], found 2",
+        ),
+        (
+            "[materials.red]\nexponent_v = -1",
+            "vase/scene.toml: materials.red.exponent_v: expected a number in [0, 1e+09], found -1",
+        ),
         ("[materials.red]\nior = 100", "vase/scene.toml: materials.red.ior: expected a number in [0.1, 10], found 100"),
         (
             "[materials.red]\ndiffuse_texture = 'none.png'",

@@ -1,0 +1,25 @@
+"""What a surface is made of at the point that a ray met: its material's numbers after textures and grain."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+
+class Finish(NamedTuple):
+    """A place on a surface.
+
+    Attributes:
+        kr, kg, kb: diffuse albedo.
+        sr, sg, sb: specular: height of Phong's highlight, or Rs of Ashikhmin and Shirley.
+        ux, uy, uz: unit tangent along the grain; any vector where the material has none.
+    """
+
+    kr: float
+    kg: float
+    kb: float
+    sr: float
+    sg: float
+    sb: float
+    ux: float
+    uy: float
+    uz: float
