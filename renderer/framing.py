@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,7 +13,8 @@ from numpy.typing import NDArray
 
 from renderer.camera import Camera
 from renderer.errors import SceneError, SettingsError
-from renderer.scene import Material, Mesh, PointLight, Rgb, Scene, Sphere, Surroundings
+from renderer.model import Model, point_lights
+from renderer.scene import BLACK, Material, Mesh, PointLight, Rgb, Scene, Sphere, Surroundings
 
 DEFAULT_MATERIAL: Final = Material("clay", diffuse=(0.62, 0.60, 0.57), specular=(0.10, 0.10, 0.10), shininess=40.0)
 """For meshes whose file states no material: warm light grey with a soft highlight."""
@@ -44,6 +46,13 @@ _LIGHTS: Final = (
 """Key, fill and rim light. Irradiance E shows a white surface that faces the light as E/pi."""
 
 
+DIMMEST: Final = 0.5
+"""Least brightness of a white surface that faces all lights of a file; 1 is the brightest a screen shows."""
+
+BRIGHTEST: Final = 2.0
+"""Greatest brightness of the same; lights come from several sides, so what is seen is below it."""
+
+
 @dataclass(frozen=True, slots=True)
 class Bounds:
     """A sphere around a model.
@@ -57,24 +66,42 @@ class Bounds:
     radius: float
 
 
-def frame_meshes(meshes: Sequence[Mesh], title: str) -> Scene:
-    """A scene of a bare model: seen from a three-quarter view, lit by three lights, at any scale.
+def frame_model(model: Model, title: str) -> Scene:
+    """A scene of a bare model: seen by its own camera and lit by its own lights where its file has them.
+
+    Without a camera it is seen from a three-quarter view, without lights lit by three, at any scale. Files
+    state lights in units of their own: the exposure is 1 unless a white surface in the middle that faces all
+    the file's lights would show below `DIMMEST` or above `BRIGHTEST`, and else shows it as that.
 
     Args:
-        meshes: the model.
+        model: what to show.
         title: one line for people; also names the model in messages.
 
     Raises:
-        SceneError: for a model without triangles or without size.
+        SceneError: for a model without triangles or without size, or lights out of range.
     """
-    bounds = bounding_sphere(meshes, (), title)
+    bounds = bounding_sphere(model.meshes, (), title)
+    lights = point_lights(model.lights, bounds.center, bounds.radius, title)
+    surroundings = STUDIO
+    if model.ambient != BLACK:
+        surroundings = dataclasses.replace(STUDIO, ambient=model.ambient)
     return Scene(
-        meshes=tuple(meshes),
-        lights=framed_lights(bounds, title),
-        surroundings=STUDIO,
-        camera=framed_camera(meshes, (), bounds),
+        meshes=model.meshes,
+        lights=lights or framed_lights(bounds, title),
+        surroundings=surroundings,
+        camera=model.camera or framed_camera(model.meshes, (), bounds),
+        exposure=_exposure(lights, bounds),
         title=title,
     )
+
+
+def _exposure(lights: Sequence[PointLight], bounds: Bounds) -> float:
+    """Exposure that shows what `lights` light; 1 without light."""
+    white = sum(
+        max(light.intensity) / max(math.dist(light.position, bounds.center), bounds.radius) ** 2 / math.pi
+        for light in lights
+    )
+    return min(max(white, DIMMEST), BRIGHTEST) / white if white > 0.0 else 1.0
 
 
 def bounding_sphere(meshes: Sequence[Mesh], spheres: Sequence[Sphere], title: str) -> Bounds:

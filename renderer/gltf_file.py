@@ -1,9 +1,10 @@
-"""Meshes of glTF 2.0 files, binary (.glb) or text (.gltf).
+"""Meshes, lights and cameras of glTF 2.0 files, binary (.glb) or text (.gltf).
 
 Read here rather than by a library, so that normalised integers, sparse accessors and strides come out right,
 textures pass through the limits of `codec`, and damage is said with the field's name. Of the default scene,
-every triangle primitive becomes one mesh with its node's transform applied. Lines, points, cameras, lights,
-skins and animations are skipped; a file that requires compressed geometry is refused.
+every triangle primitive becomes one mesh with its node's transform applied; lights and the first camera stand
+where their nodes are. Lines, points, skins and animations are skipped; a file that requires compressed geometry
+is refused.
 
 Source: Khronos glTF 2.0 specification.
 """
@@ -20,6 +21,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.camera import Camera
 from renderer.codec import decode_texture
 from renderer.errors import SceneError
 from renderer.fields import Fields
@@ -27,17 +29,21 @@ from renderer.folder import Folder
 from renderer.framing import DEFAULT_MATERIAL
 from renderer.gltf_data import LARGEST_INDEX, GltfData
 from renderer.gltf_material import GltfMaterial, read_material
+from renderer.gltf_view import light_of, read_camera, read_light
+from renderer.model import Model, StatedLight
 from renderer.placement import placed
 from renderer.scene import MAX_COORDINATE_M, Mesh, Texture
 
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
 
-_SUPPORTED: Final = re.compile(r"KHR_materials_\w+|KHR_texture_transform|KHR_mesh_quantization|EXT_texture_webp")
+_SUPPORTED: Final = re.compile(
+    r"KHR_materials_\w+|KHR_lights_punctual|KHR_texture_transform|KHR_mesh_quantization|EXT_texture_webp"
+)
 """Extensions that a file may require; the geometry of others could not be shown."""
 
 
-def read_gltf(folder: Folder, data: bytes, inner: str, max_triangles: int) -> tuple[Mesh, ...]:
-    """The meshes of a glTF file, in the order in which its nodes show them.
+def read_gltf(folder: Folder, data: bytes, inner: str, max_triangles: int) -> Model:
+    """The content of a glTF file, its meshes in the order in which its nodes show them.
 
     Args:
         folder: where its buffers and images may lie.
@@ -61,7 +67,7 @@ def read_gltf(folder: Folder, data: bytes, inner: str, max_triangles: int) -> tu
         if not isinstance(extension, str) or not _SUPPORTED.fullmatch(extension):
             raise top.refuse("extensionsRequired", "extensions that this renderer knows", extension)
     source = GltfData(folder, inner, top, chunk, max_items=4 * max_triangles)
-    return tuple(_Reader(source, max_triangles).meshes())
+    return _Reader(source, max_triangles).model()
 
 
 def _unpack(data: bytes, label: str) -> tuple[bytes, bytes | None]:
@@ -90,21 +96,39 @@ class _Reader:
     textures: dict[int, Texture] = field(default_factory=dict)
     materials: dict[int, GltfMaterial] = field(default_factory=dict)
     primitives: dict[int, list[Mesh]] = field(default_factory=dict)
+    triangles: int = 0
 
-    def meshes(self) -> Iterator[Mesh]:
-        """The meshes of all nodes of the scene."""
-        triangles = 0
+    def model(self) -> Model:
+        """The content of all nodes of the scene."""
+        meshes: list[Mesh] = []
+        lights: list[StatedLight] = []
+        cameras: list[Camera] = []
+        notes: list[str] = []
         for node, world_from_node in self._nodes():
-            if "mesh" not in node:
-                continue
-            index = node.integer("mesh", 0, LARGEST_INDEX)
-            if index not in self.primitives:
-                self.primitives[index] = list(self._primitives(self.data.entry("meshes", index)))
-            triangles += sum(len(mesh.faces) for mesh in self.primitives[index])
-            if triangles > self.max_triangles:
-                raise SceneError(f"{self.data.top.file}: expected at most {self.max_triangles} triangles, found more")
-            for mesh in self.primitives[index]:
-                yield placed(mesh, world_from_node)
+            if "mesh" in node:
+                meshes.extend(placed(mesh, world_from_node) for mesh in self._shown(node))
+            light = light_of(node)
+            if light is not None:
+                lights.append(read_light(self.data.top, light, world_from_node))
+            if "camera" in node and not cameras:
+                camera = read_camera(
+                    self.data.entry("cameras", node.integer("camera", 0, LARGEST_INDEX)), world_from_node
+                )
+                if camera is None:
+                    notes.append(f"{node.place}: an orthographic camera is left out")
+                else:
+                    cameras.append(camera)
+        return Model(tuple(meshes), tuple(lights), camera=cameras[0] if cameras else None, notes=tuple(notes))
+
+    def _shown(self, node: Fields) -> list[Mesh]:
+        """The meshes of a node, not yet placed."""
+        index = node.integer("mesh", 0, LARGEST_INDEX)
+        if index not in self.primitives:
+            self.primitives[index] = list(self._primitives(self.data.entry("meshes", index)))
+        self.triangles += sum(len(mesh.faces) for mesh in self.primitives[index])
+        if self.triangles > self.max_triangles:
+            raise SceneError(f"{self.data.top.file}: expected at most {self.max_triangles} triangles, found more")
+        return self.primitives[index]
 
     def _nodes(self) -> Iterator[tuple[Fields, NDArray[np.float64]]]:
         """All nodes of the scene, depth first, with their (4, 4) transforms to the world."""

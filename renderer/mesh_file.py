@@ -21,6 +21,7 @@ from renderer.errors import SceneError
 from renderer.folder import MAX_FILE_BYTES, Folder
 from renderer.framing import DEFAULT_MATERIAL
 from renderer.gltf_file import read_gltf
+from renderer.model import Model
 from renderer.obj_file import read_obj
 from renderer.ply_file import read_ply
 from renderer.scene import Mesh
@@ -38,8 +39,8 @@ _LARGEST_UV: Final = 1e30
 """Texture coordinates beyond this, or not finite, count as 0: they leave float32."""
 
 
-def load_meshes(path: Path, *, max_bytes: int = MAX_FILE_BYTES, max_triangles: int = MAX_TRIANGLES) -> tuple[Mesh, ...]:
-    """The meshes of a file that stands alone; files it names must lie in its folder or below.
+def load_model(path: Path, *, max_bytes: int = MAX_FILE_BYTES, max_triangles: int = MAX_TRIANGLES) -> Model:
+    """What a file that stands alone holds; files it names must lie in its folder or below.
 
     Args:
         path: the file; its ending says what it is.
@@ -51,11 +52,11 @@ def load_meshes(path: Path, *, max_bytes: int = MAX_FILE_BYTES, max_triangles: i
     """
     real = path.resolve()
     label = "" if path.parent == Path() else str(path.parent)
-    return read_meshes(Folder(real.parent, label, max_bytes), real.name, str(path), max_triangles)
+    return read_model(Folder(real.parent, label, max_bytes), real.name, str(path), max_triangles)
 
 
-def read_meshes(folder: Folder, name: str, wanted_by: str, max_triangles: int = MAX_TRIANGLES) -> tuple[Mesh, ...]:
-    """The meshes of a file of `folder`, one for each of its materials (OBJ) or primitives (glTF), else one.
+def read_model(folder: Folder, name: str, wanted_by: str, max_triangles: int = MAX_TRIANGLES) -> Model:
+    """What a file of `folder` holds: a mesh for each of its materials (OBJ) or primitives (glTF), else one.
 
     Vertices, faces, vertex normals and texture coordinates are the file's own; nothing is merged, repaired
     or turned, and without normals a mesh is flat. Meshes without a material get `DEFAULT_MATERIAL`; a PLY
@@ -77,19 +78,25 @@ def read_meshes(folder: Folder, name: str, wanted_by: str, max_triangles: int = 
     label = folder.file_label(inner)
     if not data:
         raise SceneError(f"{label}: expected a mesh file, found an empty file")
-    if suffix == ".obj":
-        meshes = read_obj(folder, data, inner, max_triangles)
-    elif suffix in (".glb", ".gltf"):
-        meshes = read_gltf(folder, data, inner, max_triangles)
-    elif suffix == ".ply":
-        meshes = (read_ply(data, label, max_triangles),)
-    else:
-        meshes = (_read_stl(data, label),)
-    shown = tuple(_tamed(mesh) for mesh in meshes if len(mesh.faces))
+    model = _read(folder, data, inner, suffix, max_triangles)
+    shown = tuple(_tamed(mesh) for mesh in model.meshes if len(mesh.faces))
     triangles = sum(len(mesh.faces) for mesh in shown)
     if not 0 < triangles <= max_triangles:
         raise SceneError(f"{label}: expected 1 to {max_triangles} triangles, found {triangles}")
-    return shown
+    return dataclasses.replace(model, meshes=shown)
+
+
+def _read(folder: Folder, data: bytes, inner: str, suffix: str, max_triangles: int) -> Model:
+    """The content of a file, by the reader of its kind."""
+    match suffix:
+        case ".obj":
+            return Model(read_obj(folder, data, inner, max_triangles))
+        case ".ply":
+            return Model((read_ply(data, folder.file_label(inner), max_triangles),))
+        case ".stl":
+            return Model((_read_stl(data, folder.file_label(inner)),))
+        case _:
+            return read_gltf(folder, data, inner, max_triangles)
 
 
 def _read_stl(data: bytes, label: str) -> Mesh:

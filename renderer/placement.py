@@ -1,4 +1,4 @@
-"""A mesh moved to its place in the scene."""
+"""Meshes, lights and cameras moved to their places in the scene."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.scene import Mesh
+from renderer.camera import Camera
+from renderer.scene import Mesh, PointLight
 
 
 def placed(mesh: Mesh, world_from_mesh: NDArray[np.float64]) -> Mesh:
@@ -36,6 +37,35 @@ def placed(mesh: Mesh, world_from_mesh: NDArray[np.float64]) -> Mesh:
         faces=np.ascontiguousarray(mesh.faces[:, ::-1]) if mirrors else mesh.faces,
         normals=normals,
     )
+
+
+def placed_light(light: PointLight, world_from_model: NDArray[np.float64]) -> PointLight:
+    """`light` moved with the model that it lights; what the model receives stays the same at any scale.
+
+    Args:
+        light: to be moved.
+        world_from_model: (4, 4) affine transform. Under unequal scales the mean one counts.
+
+    Raises:
+        SettingsError: for a light that leaves the range of a scene.
+    """
+    x, y, z = (world_from_model[:3, :3] @ light.position + world_from_model[:3, 3]).tolist()
+    area = abs(float(np.linalg.det(world_from_model[:3, :3]))) ** (2 / 3)
+    red, green, blue = (part * area for part in light.intensity)
+    return dataclasses.replace(light, position=(x, y, z), intensity=(red, green, blue))
+
+
+def placed_camera(camera: Camera, world_from_model: NDArray[np.float64]) -> Camera:
+    """`camera` moved with the model that it looks at.
+
+    Raises:
+        SettingsError: for a transform that flattens the view.
+    """
+    linear, origin = world_from_model[:3, :3], world_from_model[:3, 3]
+    px, py, pz = (linear @ camera.position + origin).tolist()
+    ax, ay, az = (linear @ camera.look_at + origin).tolist()
+    ux, uy, uz = (linear @ camera.up).tolist()
+    return dataclasses.replace(camera, position=(px, py, pz), look_at=(ax, ay, az), up=(ux, uy, uz))
 
 
 def _cofactor(linear: NDArray[np.float64]) -> tuple[NDArray[np.float64], bool]:

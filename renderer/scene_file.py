@@ -50,6 +50,8 @@ ior = 1.5
 [[mesh]]
 file = "vase.obj"                  # OBJ, GLB, glTF, PLY or STL
 material = "gold"                  # or the file's own; { Lid = "wood" } replaces only its material Lid
+use_camera = false                 # or false; true: the scene is seen by the file's camera, in place of [camera]
+use_lights = false                 # or false; true: the file's lights, beside those of [[light]]
 scale = 0.01                       # or 1; [1, 2, 1] scales unequally, a negative factor mirrors
 rotate_deg = [0.0, 30.0, 0.0]      # or 0: about x, then y, then z, after scaling
 translate = [0.0, 0.8, 0.0]        # or 0, after rotating
@@ -90,8 +92,9 @@ from renderer.errors import SceneError, SettingsError
 from renderer.fields import Fields
 from renderer.folder import MAX_FILE_BYTES, Folder
 from renderer.framing import DEFAULT_MATERIAL, STUDIO, bounding_sphere, framed_camera, framed_lights
-from renderer.mesh_file import MAX_TRIANGLES, read_meshes
-from renderer.placement import placed
+from renderer.mesh_file import MAX_TRIANGLES, read_model
+from renderer.model import Model, point_lights
+from renderer.placement import placed, placed_camera, placed_light
 from renderer.scene import (
     BASES,
     BLACK,
@@ -101,6 +104,7 @@ from renderer.scene import (
     Material,
     Mesh,
     PointLight,
+    Rgb,
     Scene,
     Sphere,
     Surroundings,
@@ -148,8 +152,11 @@ class _Reader:
     max_triangles: int
     materials: dict[str, Material] = field(default_factory=dict)
     textures: dict[str, Texture] = field(default_factory=dict)
-    files: dict[str, tuple[Mesh, ...]] = field(default_factory=dict)
+    files: dict[str, Model] = field(default_factory=dict)
     triangles: int = 0
+    cameras: list[Camera] = field(default_factory=list)
+    lights: list[PointLight] = field(default_factory=list)
+    ambient: Rgb = BLACK
 
     def scene(self, top: Fields) -> Scene:
         """The scene of the file's top level."""
@@ -162,15 +169,23 @@ class _Reader:
         spheres = [self._sphere(fields) for fields in top.tables("sphere")]
         lights = tuple(_light(fields) for fields in top.tables("light"))
         surroundings = _surroundings(top.table("surroundings")) if "surroundings" in top else STUDIO
+        if self.ambient != BLACK:
+            red, green, blue = (a + b for a, b in zip(surroundings.ambient, self.ambient, strict=True))
+            surroundings = dataclasses.replace(surroundings, ambient=(red, green, blue))
         camera = _camera(top.table("camera")) if "camera" in top else None
+        if self.cameras and camera is not None:
+            raise top.refuse("camera", "no camera beside that of a mesh file (use_camera)", top.value("camera"))
+        camera = self.cameras[0] if self.cameras else camera
+        lights += tuple(self.lights)
+        lit = "light" in top or bool(self.lights)
         camera_path = read_camera_path(top.tables("camera_path"))
         if camera is None and camera_path is not None:
             camera = camera_path.keyframes[0].camera
         top.refuse_unknown()
-        if camera is None or "light" not in top:
+        if camera is None or not lit:
             bounds = bounding_sphere(meshes, spheres, top.file)
             camera = camera or framed_camera(meshes, spheres, bounds)
-            lights = lights if "light" in top else framed_lights(bounds, top.file)
+            lights = lights if lit else framed_lights(bounds, top.file)
         return Scene(tuple(meshes), tuple(spheres), lights, surroundings, camera, exposure, title, camera_path)
 
     def _material(self, fields: Fields, name: str) -> Material:
@@ -206,12 +221,13 @@ class _Reader:
         name = fields.text("file")
         if name not in self.files:
             where = f"{fields.file}: {fields.where('file')}"
-            self.files[name] = read_meshes(self.folder, name, where, self.max_triangles)
-        meshes = self.files[name]
+            self.files[name] = read_model(self.folder, name, where, self.max_triangles)
+        meshes = self.files[name].meshes
         self.triangles += sum(len(mesh.faces) for mesh in meshes)
         if self.triangles > self.max_triangles:
             raise fields.refuse("file", f"at most {self.max_triangles} triangles in all", self.triangles)
         matrix = _matrix(fields)
+        self._use_view(fields, self.files[name], matrix)
         casts_shadows = fields.flag("casts_shadows", True)
         replacements = self._replacements(fields, [mesh.material.name for mesh in meshes])
         fields.refuse_unknown()
@@ -226,6 +242,25 @@ class _Reader:
             )
             for mesh in meshes
         ]
+
+    def _use_view(self, fields: Fields, model: Model, matrix: NDArray[np.float64]) -> None:
+        """Take in the camera and the lights of a mesh file where its table asks for them."""
+        try:
+            if fields.flag("use_camera", False):
+                if model.camera is None or self.cameras:
+                    found = "a second camera" if self.cameras else fields.text("file")
+                    raise fields.refuse("use_camera", "one file with a camera", found)
+                self.cameras.append(placed_camera(model.camera, matrix))
+            if fields.flag("use_lights", False):
+                if not model.lights and model.ambient == BLACK:
+                    raise fields.refuse("use_lights", "a file with lights", fields.text("file"))
+                bounds = bounding_sphere(model.meshes, (), fields.file)
+                lights = point_lights(model.lights, bounds.center, bounds.radius, fields.file)
+                self.lights.extend(placed_light(light, matrix) for light in lights)
+                red, green, blue = (a + b for a, b in zip(self.ambient, model.ambient, strict=True))
+                self.ambient = (red, green, blue)
+        except SettingsError as error:
+            raise fields.in_file(error) from None
 
     def _replacements(self, fields: Fields, names: list[str]) -> dict[str, Material]:
         """By name, the materials that take the place of the file's own."""

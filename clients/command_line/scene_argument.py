@@ -59,11 +59,11 @@ def load_scene(text: str, folder: Path | None) -> PreparedScene:
                 raise SceneError(f"{text}: expected a scene folder or a mesh file, found nothing there")
             raise UnknownScene(text, library.ids())
 
-        from renderer.framing import frame_meshes
-        from renderer.mesh_file import load_meshes
+        from renderer.framing import frame_model
+        from renderer.mesh_file import load_model
         from renderer.prepared import prepare
         from renderer.scene_file import load_scene_folder
 
         if path.is_dir():
             return prepare(load_scene_folder(path))
-        return prepare(frame_meshes(load_meshes(path), path.stem))
+        return prepare(frame_model(load_model(path), path.stem))

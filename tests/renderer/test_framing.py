@@ -16,9 +16,10 @@ from renderer.framing import (
     MARGIN,
     STUDIO,
     bounding_sphere,
-    frame_meshes,
+    frame_model,
     framed_camera,
 )
+from renderer.model import Model
 from renderer.scene import BLACK, Mesh, Scene, Sphere
 
 
@@ -47,7 +48,7 @@ def on_screen(scene: Scene, points: np.ndarray, display: Display) -> np.ndarray:
 def test_the_model_fills_the_picture_at_every_size(size: float, offset: float) -> None:
     center = (offset * size, -2 * offset * size, offset * size)
     display = Display(1920, 1080)
-    scene = frame_meshes([ball(size, center)], "ball")
+    scene = frame_model(Model((ball(size, center),)), "ball")
     seen = on_screen(scene, scene.meshes[0].vertices, display)
     assert seen.min() > 0
     assert seen[:, 0].max() < 1920
@@ -64,15 +65,15 @@ def test_the_light_that_arrives_is_the_same_at_every_size(size: float) -> None:
             [np.array(light.intensity) / np.sum((np.array(light.position) - at) ** 2) for light in scene.lights]
         )
 
-    expected = arriving(frame_meshes([ball()], "ball"), np.zeros(3))
-    scene = frame_meshes([ball(size, (size, 0.0, 0.0))], "ball")
+    expected = arriving(frame_model(Model((ball(),)), "ball"), np.zeros(3))
+    scene = frame_model(Model((ball(size, (size, 0.0, 0.0)),)), "ball")
     np.testing.assert_allclose(arriving(scene, np.array([size, 0, 0])), expected, rtol=1e-9)
     key, fill, rim = expected.sum(axis=1)
     assert key > rim > fill
 
 
 def test_the_brightest_place_does_not_clip_and_only_the_key_casts_shadows() -> None:
-    scene = frame_meshes([ball()], "ball")
+    scene = frame_model(Model((ball(),)), "ball")
     points = ball().vertices
     light = np.array(STUDIO.ambient) * np.ones((len(points), 3))
     for source in scene.lights:
@@ -85,7 +86,7 @@ def test_the_brightest_place_does_not_clip_and_only_the_key_casts_shadows() -> N
 
 
 def test_the_view_is_from_the_front_right_and_above() -> None:
-    camera = frame_meshes([ball()], "ball").camera
+    camera = frame_model(Model((ball(),)), "ball").camera
     x, y, z = camera.position
     assert z > x > y > 0
     assert camera.vertical_fov_deg == FIELD_OF_VIEW_DEG
@@ -94,13 +95,13 @@ def test_the_view_is_from_the_front_right_and_above() -> None:
 def test_only_vertices_that_are_seen_count() -> None:
     model = ball()
     stray = Mesh(np.concatenate([model.vertices, [[1e6, 0, 0]]]), model.faces, DEFAULT_MATERIAL)
-    assert frame_meshes([stray], "a").camera == frame_meshes([model], "b").camera
+    assert frame_model(Model((stray,)), "a").camera == frame_model(Model((model,)), "b").camera
 
 
 @pytest.mark.parametrize("stretch", [(20, 1, 1), (1, 20, 1), (1, 1, 20), (9, 0, 9)])
 def test_long_and_flat_models_touch_an_edge_of_a_4_to_3_screen_and_stay_inside(stretch: tuple[int, int, int]) -> None:
     model = ball()
-    scene = frame_meshes([Mesh(model.vertices * stretch, model.faces, DEFAULT_MATERIAL)], "long")
+    scene = frame_model(Model((Mesh(model.vertices * stretch, model.faces, DEFAULT_MATERIAL),)), "long")
     seen = on_screen(scene, scene.meshes[0].vertices, Display(1200, 900)) / (1200, 900)
     assert seen.min() > 0
     assert seen.max() < 1
@@ -123,7 +124,7 @@ def test_meshes_and_spheres_are_bounded_together() -> None:
 
 
 def test_title_and_surroundings() -> None:
-    scene = frame_meshes([ball()], "A ball")
+    scene = frame_model(Model((ball(),)), "A ball")
     assert scene.title == "A ball"
     assert scene.surroundings is STUDIO
     assert DEFAULT_MATERIAL.transmission == DEFAULT_MATERIAL.reflection == BLACK
@@ -134,17 +135,17 @@ def test_nothing_to_frame() -> None:
     none = Mesh(np.ones((3, 3)), np.zeros((0, 3), dtype=np.int64), DEFAULT_MATERIAL)
     for meshes in ([], [none]):
         with pytest.raises(SceneError, match=r"a\.stl: expected something to show, found no triangle and no sphere"):
-            frame_meshes(meshes, "a.stl")
+            frame_model(Model(meshes), "a.stl")
     with pytest.raises(SceneError, match=r"a\.stl: expected a model with a size"):
-        frame_meshes([point], "a.stl")
+        frame_model(Model((point,)), "a.stl")
 
 
 @pytest.mark.parametrize("center", [(1e12 - 1, 0.0, 0.0), (1e11, -1e11, 1e11)])
 def test_a_model_as_small_as_its_place_allows_is_still_seen_from_outside(center: tuple[float, float, float]) -> None:
-    camera = frame_meshes([ball(1e-4, center)], "far").camera
+    camera = frame_model(Model((ball(1e-4, center),)), "far").camera
     assert camera.position != camera.look_at
 
 
 def test_a_model_too_large_for_its_lights() -> None:
     with pytest.raises(SceneError, match=r"a\.stl: cannot be lit"):
-        frame_meshes([ball(9e11)], "a.stl")
+        frame_model(Model((ball(9e11),)), "a.stl")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 import tomllib
 from pathlib import Path
 
@@ -12,9 +13,11 @@ from PIL import Image
 
 import renderer.scene_file
 from renderer.errors import SceneError
-from renderer.framing import DEFAULT_MATERIAL, STUDIO, frame_meshes
+from renderer.framing import DEFAULT_MATERIAL, STUDIO, frame_model
+from renderer.model import Model
 from renderer.scene import Scene, Surroundings
 from renderer.scene_file import load_scene_folder
+from tests.renderer.model_files import gltf
 
 VASE = """mtllib vase.mtl
 v 0 0 0
@@ -83,7 +86,7 @@ def test_the_worked_example_shows_every_field(folder: Path) -> None:
         "camera": {"position", "look_at", "up", "vertical_fov_deg"},
         "camera_path": {"time_s", "position", "look_at", "up", "vertical_fov_deg"},
         "surroundings": {"zenith", "horizon", "ambient"},
-        "mesh": {"file", "material", "scale", "rotate_deg", "translate", "casts_shadows"},
+        "mesh": {"file", "material", "use_camera", "use_lights", "scale", "rotate_deg", "translate", "casts_shadows"},
         "sphere": {"center", "radius", "material", "casts_shadows"},
         "light": {"kind", "position", "intensity", "casts_shadows"},
     }
@@ -145,7 +148,7 @@ def test_a_file_placed_twice_is_read_once(folder: Path) -> None:
 
 def test_what_is_left_out_is_framed(folder: Path) -> None:
     scene = load(folder, '[[mesh]]\nfile = "vase.obj"\n')
-    framed = frame_meshes(scene.meshes, "vase")
+    framed = frame_model(Model(scene.meshes), "vase")
     assert scene.camera == framed.camera
     assert scene.lights == framed.lights
     assert scene.surroundings is STUDIO
@@ -237,6 +240,54 @@ def test_what_is_given_is_taken(folder: Path) -> None:
 )
 def test_mistakes_are_told_with_their_place(folder: Path, text: str, message: str) -> None:
     assert refused(folder, text).startswith(message)
+
+
+def lamp_file(folder: Path) -> None:
+    """A glTF file of one triangle, a camera and a light."""
+    tree = gltf(
+        extensions={"KHR_lights_punctual": {"lights": [{"type": "point", "intensity": 683.0}]}},
+        cameras=[{"type": "perspective", "perspective": {"yfov": 0.5, "znear": 0.1}}],
+        nodes=[{"mesh": 0, "camera": 0, "extensions": {"KHR_lights_punctual": {"light": 0}}, "translation": [0, 0, 3]}],
+    )
+    (folder / "lamp.gltf").write_text(json.dumps(tree))
+
+
+def test_a_mesh_files_camera_and_lights_are_used_where_asked_for(folder: Path) -> None:
+    lamp_file(folder)
+    table = '[[mesh]]\nfile = "lamp.gltf"\nscale = 2\n'
+    assert load(folder, table).camera == frame_model(Model(load(folder, table).meshes), "vase").camera
+    assert len(load(folder, table).lights) == 3
+    scene = load(folder, table + "use_camera = true\nuse_lights = true\n")
+    assert scene.camera.position == (0.0, 0.0, 6.0)
+    (light,) = scene.lights
+    assert light.position == (0.0, 0.0, 6.0)
+    np.testing.assert_allclose(light.intensity, (4.0, 4.0, 4.0))
+    more = load(
+        folder,
+        '[[light]]\nkind = "point"\nposition = [9, 9, 9]\nintensity = [1, 1, 1]\n' + table + "use_lights = true\n",
+    )
+    assert [light.position for light in more.lights] == [(9.0, 9.0, 9.0), (0.0, 0.0, 6.0)]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[[mesh]]\nfile = 'vase.obj'\nuse_camera = true", "mesh[0].use_camera: expected one file with a camera"),
+        ("[[mesh]]\nfile = 'vase.obj'\nuse_lights = true", "mesh[0].use_lights: expected a file with lights"),
+        (
+            "[[mesh]]\nfile = 'lamp.gltf'\nuse_camera = true\n" * 2,
+            "mesh[1].use_camera: expected one file with a camera",
+        ),
+        (
+            "[camera]\nposition = [0, 0, 1]\nlook_at = [0, 0, 0]\n[[mesh]]\nfile = 'lamp.gltf'\nuse_camera = true",
+            "camera: expected no camera beside that of a mesh file (use_camera)",
+        ),
+        ("[[mesh]]\nfile = 'lamp.gltf'\nuse_lights = 1", "mesh[0].use_lights: expected true or false, found 1"),
+    ],
+)
+def test_mistakes_in_taking_a_mesh_files_view(folder: Path, text: str, message: str) -> None:
+    lamp_file(folder)
+    assert refused(folder, text).startswith(f"vase/scene.toml: {message}")
 
 
 def test_a_mistake_in_a_mesh_file_names_that_file(folder: Path) -> None:

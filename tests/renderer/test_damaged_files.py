@@ -1,0 +1,130 @@
+"""Damaged mesh files: an error or a scene, nothing else, in bounded time and memory."""
+
+from __future__ import annotations
+
+import base64
+import json
+import signal
+import tracemalloc
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from renderer.errors import SceneError
+from renderer.mesh_file import load_model
+from renderer.model import Model
+from tests.renderer.model_files import COLOURED, SQUARE, glb, gltf, ply, png
+
+MUTATIONS = 150
+"""Damaged copies of each file."""
+
+MAX_SECONDS = 10
+"""Longest time for one file of a few kilobytes, on a busy machine; a good one takes milliseconds."""
+
+MAX_BYTES = 64 << 20
+"""Most memory for one file of a few kilobytes."""
+
+TELLING = (0, 1, 9, 10, 32, 45, 57, 60, 127, 128, 255)
+"""Bytes that hurt: null, line feed, minus, digit, angle bracket, the limits of signed and unsigned bytes."""
+
+
+def good_files() -> dict[str, bytes]:
+    box = trimesh.creation.box()
+    textured = glb(
+        gltf(
+            images=[{"uri": "data:;base64," + base64.b64encode(png((9, 8, 7))).decode()}],
+            textures=[{"source": 0}],
+            materials=[{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}],
+        )
+    )
+    obj = "mtllib m.mtl\n" + SQUARE + "vt 0 0\nvn 0 0 1\nusemtl m\nf 1/1/1 2/1/1 3/1/1 4/1/1\nf -1 -2 -3\n"
+    return {
+        "a.obj": obj.encode(),
+        "m.mtl": b"newmtl m\nKd 0.2 0.4 0.6\nKs 0.5 0.5 0.5\nNs 60\nillum 7\nNi 1.5\nTf 0.5 0.5 0.5\nmap_Kd t.png\n",
+        "a.gltf": json.dumps(gltf()).encode(),
+        "a.glb": textured,
+        "text.ply": ply("ascii", [[0, 1, 2], [0, 1, 2, 3]], COLOURED),
+        "little.ply": ply("binary_little_endian", [[0, 1, 2], [0, 1, 2, 3]]),
+        "big.ply": ply("binary_big_endian", [[0, 1, 2], [0, 2, 3]], COLOURED),
+        "binary.stl": trimesh.exchange.stl.export_stl(box),
+        "text.stl": trimesh.exchange.stl.export_stl_ascii(box).encode(),
+    }
+
+
+def damaged(good: bytes, generator: np.random.Generator) -> Iterator[bytes]:
+    """Copies of `good`, each damaged in one of five ways."""
+    for index in range(MUTATIONS):
+        data = bytearray(good)
+        at, until = sorted(int(place) for place in generator.integers(0, len(good), 2))
+        match index % 5:
+            case 0:
+                for place in generator.integers(0, len(good), generator.integers(1, 4)):
+                    data[place] = generator.choice([generator.integers(0, 256), *TELLING])
+            case 1:
+                data[at] ^= 1 << int(generator.integers(0, 8))
+            case 2:
+                del data[at:]
+            case 3:
+                data[at:at] = generator.integers(0, 256, generator.integers(1, 9), dtype=np.uint8).tobytes()
+            case _:
+                data[at:at] = data[at:until] * int(generator.integers(1, 4))
+        yield bytes(data)
+
+
+@contextmanager
+def bounded(seconds: int) -> Iterator[None]:
+    """Raise TimeoutError in a block that runs for longer."""
+
+    def ring(*_: object) -> None:
+        raise TimeoutError
+
+    before = signal.signal(signal.SIGALRM, ring)
+    signal.alarm(seconds)
+    try:
+        yield
+    finally:
+        signal.alarm(0)
+        signal.signal(signal.SIGALRM, before)
+
+
+def read(path: Path) -> Model | str:
+    """The model, or the message of the SceneError."""
+    try:
+        with bounded(MAX_SECONDS):
+            return load_model(path, max_triangles=100_000)
+    except SceneError as error:
+        return str(error)
+
+
+@pytest.mark.parametrize("name", list(good_files()))
+def test_damaged_files_give_a_model_or_a_scene_error(tmp_path: Path, name: str) -> None:
+    files = good_files()
+    (tmp_path / "t.png").write_bytes(png((9, 8, 7)))
+    (tmp_path / "m.mtl").write_bytes(files["m.mtl"])
+    main = tmp_path / ("a.obj" if name == "m.mtl" else name)
+    main.write_bytes(files[main.name])
+    assert isinstance(read(main), Model)
+    results: list[Model | str] = []
+    tracemalloc.start()
+    try:
+        for data in damaged(files[name], np.random.default_rng(5)):
+            (tmp_path / name).write_bytes(data)
+            tracemalloc.reset_peak()
+            before, _ = tracemalloc.get_traced_memory()
+            results.append(read(main))
+            assert tracemalloc.get_traced_memory()[1] - before < MAX_BYTES
+    finally:
+        tracemalloc.stop()
+    models = [result for result in results if isinstance(result, Model)]
+    messages = [result for result in results if isinstance(result, str)]
+    assert messages
+    assert all("expected" in message and "\n" not in message for message in messages)
+    for model in models:
+        assert model.meshes
+        for mesh in model.meshes:
+            assert np.isfinite(mesh.vertices).all()
+            assert mesh.faces.max() < len(mesh.vertices)
