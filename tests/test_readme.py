@@ -90,15 +90,18 @@ def test_each_command_works(words: list[str], tmp_path: Path, monkeypatch: pytes
     if words[0] == "serve":
         assert build_parser().parse_args(words).run is not None
         return
-    small = ["--size", "64x36", "--samples", "1"] if words[0] in ("render", "bench") else []
+    (tmp_path / "eye.csv").write_text("t_ms,x_px,y_px\n0,960,540\n40,1200,300\n")
+    small = ["--size", "64x36", "--samples", "1"] if words[0] in ("render", "bench", "animate") else []
+    small += ["--seconds", "0.1"] if words[0] == "animate" else []
     assert main([*words, *small]) == 0
     if "-o" in words:
-        assert (tmp_path / words[words.index("-o") + 1]).stat().st_size > 100
+        output = tmp_path / words[words.index("-o") + 1]
+        assert len(list(output.iterdir())) > 1 if output.is_dir() else output.stat().st_size > 100
 
 
 def test_the_table_of_commands_is_complete() -> None:
     named = {words.split()[1].strip("`") for words, _ in table("Commands")}
-    assert named == {"serve", "render", "scenes", "bench"}
+    assert named == {"serve", "render", "scenes", "bench", "animate"}
 
 
 def test_every_setting_is_in_the_table_with_its_default() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from clients.gaze_trace import GazeTraceError
 from renderer.errors import RenderError, SettingsError
 
 OK = 0
@@ -17,14 +18,18 @@ class UsageError(Exception):
     """A command line that cannot be carried out; the message is one line."""
 
 
+BAD_INPUTS = (UsageError, RenderError, GazeTraceError)
+"""What the user can mend by other input; their messages are one line fit to show."""
+
+
 def exit_code(error: Exception) -> int:
     """2 where the user can mend it by other input, else 1."""
-    return BAD_INPUT if isinstance(error, UsageError | RenderError) else FAILED
+    return BAD_INPUT if isinstance(error, BAD_INPUTS) else FAILED
 
 
 def one_line(error: Exception) -> str:
     """What happened, on one line: our own errors as they are, the system's with the file they are about."""
-    if isinstance(error, UsageError | RenderError):
+    if isinstance(error, BAD_INPUTS):
         text = str(error)
     elif isinstance(error, OSError) and error.strerror:
         text = f"{error.filename}: {error.strerror}" if error.filename else error.strerror

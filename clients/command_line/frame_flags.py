@@ -39,9 +39,20 @@ FLAG_OF_FIELD = {
 }
 
 
-def add_frame_flags(parser: argparse.ArgumentParser, samples: int = Quality().samples_per_cell) -> None:
-    """Add the flags of `FLAG_OF_FIELD` to `parser`, with the records' own defaults, but `samples` a cell."""
-    _add_screen_flags(parser.add_argument_group("gaze and screen"))
+def add_frame_flags(
+    parser: argparse.ArgumentParser, samples: int = Quality().samples_per_cell, *, gaze: bool = True
+) -> None:
+    """Add the flags of `FLAG_OF_FIELD` to `parser`, with the records' own defaults, but `samples` a cell.
+
+    Args:
+        parser: of the command.
+        samples: default of `--samples`.
+        gaze: False leaves `--gaze` out, for a command that has its gaze from elsewhere.
+    """
+    if gaze:
+        _add_gaze_flag(parser.add_argument_group("gaze"))
+    parser.set_defaults(gaze=None)
+    _add_screen_flags(parser.add_argument_group("screen"))
     _add_quality_flags(parser.add_argument_group("detail"), samples)
     camera = parser.add_argument_group("camera (each defaults to the scene's own)")
     camera.add_argument("--camera-position", type=three_numbers, metavar="X,Y,Z", help="where the eye is [m]")
@@ -50,14 +61,17 @@ def add_frame_flags(parser: argparse.ArgumentParser, samples: int = Quality().sa
     camera.add_argument("--camera-fov", type=float, metavar="DEG", help="vertical field of view [deg]")
 
 
-def _add_screen_flags(screen: argparse._ArgumentGroup) -> None:
-    default = Display()
-    screen.add_argument(
+def _add_gaze_flag(group: argparse._ArgumentGroup) -> None:
+    group.add_argument(
         "--gaze",
         type=two_numbers,
         metavar="X,Y",
         help="where the eye looks, in pixels from the top-left corner; may lie off the screen (default: the centre)",
     )
+
+
+def _add_screen_flags(screen: argparse._ArgumentGroup) -> None:
+    default = Display()
     screen.add_argument(
         "--size",
         type=size,

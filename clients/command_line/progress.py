@@ -24,17 +24,31 @@ def working(text: str) -> Iterator[None]:
 
 
 @contextmanager
-def counting(text: str, total: int) -> Iterator[Callable[[], None]]:
-    """Show `text` and how many of `total` steps are done until the block ends; it calls what it gets after each."""
+def counting(text: str, total: int, done: int = 0) -> Iterator[Callable[[], None]]:
+    """Show `text` and how many of `total` steps are done until the block ends; it calls what it gets after each.
+
+    Args:
+        text: what is going on.
+        total: number of steps.
+        done: how many of them were done before.
+    """
     if not sys.stderr.isatty():
         yield lambda: None
         return
     from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
 
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    times = (TimeElapsedColumn(), TextColumn("left"), TimeRemainingColumn())
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), *times)
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
-        task = progress.add_task(text, total=total)
+        task = progress.add_task(text, total=total, completed=done)
         yield lambda: progress.advance(task)
 
 

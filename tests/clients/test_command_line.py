@@ -29,40 +29,17 @@ from clients.command_line.render import write_whole
 from clients.command_line.serve import flag_of, setting_texts, settings_of
 from renderer.codec import decode_texture
 from service.settings import Settings
+from tests.clients.commands import PATIENCE_S, failing, start
 
-ROOT = Path(__file__).parents[2]
-COMMANDS = ("serve", "render", "scenes", "bench")
+pytestmark = pytest.mark.usefixtures("plain_environment")
+
+COMMANDS = ("serve", "render", "scenes", "bench", "animate")
 SMALL = ("--size", "96x54")
 RENDER = ("render", "spheres", "-o", "a.png")
 CUBE = """\
 v -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\nv -1 1 -1\nv -1 -1 1\nv 1 -1 1\nv 1 1 1\nv -1 1 1
 f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8
 """
-PATIENCE_S = 120
-"""How long a process may take to say something: the first one compiles the kernels."""
-
-
-@pytest.fixture(autouse=True)
-def plain_environment(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """No setting of the caller's shell, and a folder of one's own to work in."""
-    for name in [name for name in os.environ if name.startswith(("GAZETRACE_", "PYTHON"))]:
-        monkeypatch.delenv(name)
-    monkeypatch.setenv("PYTHONPATH", str(ROOT))
-    monkeypatch.chdir(tmp_path)
-
-
-def start(*words: str, **options: object) -> subprocess.Popen[bytes]:
-    """The command as a process of its own."""
-    return subprocess.Popen([sys.executable, "-W", "error", "-m", "clients.command_line", *words], **options)  # type: ignore[call-overload, no-any-return]
-
-
-def failing(capsys: pytest.CaptureFixture[str], *words: str, status: int = 2) -> str:
-    """Run a command that must fail; the one line it says about it."""
-    assert main(words) == status
-    said = capsys.readouterr()
-    assert said.out == ""
-    assert re.fullmatch(r"gazetrace: [^\n]+\n", said.err), said.err
-    return said.err
 
 
 def pixels_of(path: Path) -> np.ndarray:
@@ -112,7 +89,7 @@ def test_version(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_help_imports_nothing_slow() -> None:
-    slow = {"numba", "embreex", "trimesh", "PIL", "fastapi", "uvicorn", "rich"}
+    slow = {"numba", "embreex", "trimesh", "PIL", "fastapi", "uvicorn", "rich", "av"}
     code = f"import sys, clients.command_line as c; c.build_parser().format_help(); print({slow} & set(sys.modules))"
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert found.stdout.strip() == "set()"
