@@ -91,7 +91,7 @@ def add(commands: argparse._SubParsersAction[Any]) -> None:
         "--output",
         required=True,
         metavar="FILE",
-        help=f"a video ({', '.join(VIDEO_SUFFIXES)}), a folder for {FRAME_NAME}, or a pattern such as clip/%%04d.png",
+        help=f"a video ({', '.join(VIDEO_SUFFIXES)}), a folder for frame-00000.png, ..., or a pattern: clip/%%04d.png",
     )
     parser.add_argument(
         "--fps", type=frame_rate, default=Fraction(25), metavar="F", help="frames a second (default 25)"

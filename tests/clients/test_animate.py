@@ -24,7 +24,7 @@ from tests.clients.commands import PATIENCE_S, failing, start
 
 pytestmark = pytest.mark.usefixtures("plain_environment")
 
-SCREEN = ("--size", "96x54", "--screen-cm", "20", "--samples", "2")
+SCREEN = ("--size", "96x54", "--screen-cm", "20", "--samples", "2", "--acuity-scale", "8", "--bucket", "0")
 EYE = "t_ms,x_px,y_px,valid\n0,20,10,1\n30,,,0\n70,60.5,40,1\n79,5,5,1\n80,-9,70,1\n100,48,27,1\n"
 SHOWN = ["20,10", "20,10", "-9,70"]
 """Gaze at 0, 40 and 80 ms: the first, the one before the blink, the newest."""
