@@ -1,16 +1,22 @@
 """The effect plan: what a scene calls for, and therefore which rays exist.
 
 Only content that can be seen or can cast a shadow counts: a material that no face has, a light that is
-black, a texture that nothing looks up call for nothing.
+black or too faint to change a pixel, a texture that nothing looks up call for nothing.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from renderer.scene import BLACK, Material, Scene
+import numpy as np
+
+from renderer.light_reach import reaching_lights
+from renderer.scene import BLACK, Light, Material, Mesh, PointLight, RectangleLight, Scene, SphereLight
+
+EFFECTS = ("textures", "specular", "shadows", "soft_shadows", "reflection", "refraction")
+"""All there are: `shadows` are the hard ones of point lights, `soft_shadows` those of lights with a size."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,7 +24,7 @@ class Effect:
     """One effect of the tracer.
 
     Attributes:
-        name: `shadows`, `specular`, `textures`, `reflection` or `refraction`.
+        name: one of `EFFECTS`.
         reason: what in the scene calls for it, one line.
     """
 
@@ -41,18 +47,27 @@ class EffectPlan:
 def plan_effects(scene: Scene) -> EffectPlan:
     """What `scene` calls for, with the reason of each effect."""
     users = _material_users(scene)
+    lights = reaching_lights(scene)
+    casting: dict[str, list[Light]] = {
+        "shadows": [light for light in lights if isinstance(light, PointLight) and light.casts_shadows],
+        "soft_shadows": [light for light in lights if not isinstance(light, PointLight) and light.casts_shadows],
+    }
+    casters = _casters(scene)
     calls: dict[str, Callable[[Material], bool]] = {
         "textures": lambda material: material.diffuse_texture is not None and material.diffuse != BLACK,
-        "specular": lambda material: has_highlight(material) and bool(_lit(scene)),
-        "shadows": lambda material: _takes_light(material) and bool(_shadow_lights(scene)) and _casters(scene) > 0,
+        "specular": lambda material: has_highlight(material) and bool(lights),
+        "shadows": lambda material: _takes_light(material) and bool(casting["shadows"]) and casters > 0,
+        "soft_shadows": lambda material: _takes_light(material) and bool(casting["soft_shadows"]) and casters > 0,
         "reflection": lambda material: material.reflection != BLACK or _is_boundary(material),
         "refraction": lambda material: material.transmission != BLACK,
     }
     effects = []
     for name, calls_for in calls.items():
         called_by = [material for material in users if calls_for(material)]
-        if called_by:
-            effects.append(Effect(name, _reason(name, scene, called_by, users)))
+        if called_by and name in casting:
+            effects.append(Effect(name, f"{_named_lights(casting[name])}, {_count(casters, 'shadow-casting object')}"))
+        elif called_by:
+            effects.append(Effect(name, _bearers(called_by, users)))
     return EffectPlan(tuple(effects))
 
 
@@ -60,19 +75,18 @@ def _material_users(scene: Scene) -> dict[Material, Counter[str]]:
     """Materials that something visible has, with how many triangles and spheres have them."""
     users: dict[Material, Counter[str]] = {}
     for mesh in scene.meshes:
-        if len(mesh.faces):
-            users.setdefault(mesh.material, Counter())["triangle"] += len(mesh.faces)
+        solid = _solid_faces(mesh)
+        if solid:
+            users.setdefault(mesh.material, Counter())["triangle"] += solid
     for sphere in scene.spheres:
         users.setdefault(sphere.material, Counter())["sphere"] += 1
     return users
 
 
-def _lit(scene: Scene) -> list[str]:
-    return ["light" for light in scene.lights if light.intensity != BLACK]
-
-
-def _shadow_lights(scene: Scene) -> list[str]:
-    return ["light" for light in scene.lights if light.intensity != BLACK and light.casts_shadows]
+def _solid_faces(mesh: Mesh) -> int:
+    """How many of its triangles have an area; the others are not seen."""
+    a, b, c = (mesh.vertices[mesh.faces[:, corner]] for corner in range(3))
+    return int((np.cross(b - a, c - a) != 0.0).any(axis=1).sum())
 
 
 def _casters(scene: Scene) -> int:
@@ -94,9 +108,15 @@ def _is_boundary(material: Material) -> bool:
     return material.transmission != BLACK and material.ior != 1.0
 
 
-def _reason(name: str, scene: Scene, called_by: list[Material], users: dict[Material, Counter[str]]) -> str:
-    if name == "shadows":
-        return f"{_count(len(_shadow_lights(scene)), 'light')}, {_count(_casters(scene), 'shadow-casting object')}"
+def _named_lights(lights: Sequence[Light]) -> str:
+    """How many lights of each kind."""
+    kinds = {PointLight: "point light", RectangleLight: "rectangle light", SphereLight: "sphere light"}
+    counts = Counter(kinds[type(light)] for light in lights)
+    return " and ".join(_count(number, kind) for kind, number in sorted(counts.items()))
+
+
+def _bearers(called_by: list[Material], users: dict[Material, Counter[str]]) -> str:
+    """What has these materials."""
     parts = []
     for material in called_by[:3]:
         bearers = " and ".join(_count(number, kind) for kind, number in sorted(users[material].items()))

@@ -63,7 +63,7 @@ def grow(
     missing, held, fewest = missing_cells(samples, slots, wanted, found, had)
     chosen, first = found[:missing], had[:missing]
     until = np.full(missing, wanted, dtype=np.int32)
-    starts = block_starts(until - first, block_rays(prepared))
+    starts = block_starts(until - first, block_rays(prepared, quality))
     counts = [RayCounts()] * (len(starts) - 1)
     rejected = [0] * (len(starts) - 1)
 

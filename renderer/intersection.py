@@ -1,4 +1,4 @@
-"""What a ray meets: triangles through Embree, spheres through their own tree.
+"""What a ray meets: triangles through Embree, spheres through their own tree, area lights one by one.
 
 The only file that talks to Embree. embreex checks no bounds, wants float32 C-contiguous arrays of equal
 length, overwrites a distance array it is given, and builds its tree at the first query; all of that is
@@ -13,6 +13,7 @@ from embreex.rtcore import EmbreeDevice
 from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import NDArray
 
+from renderer.area_light import nearest_area_lights
 from renderer.kernel import kernel
 from renderer.rays import Hits
 from renderer.sphere import SphereTree, nearest_spheres, shade_spheres
@@ -30,6 +31,7 @@ class Intersector:
         faces: NDArray[np.int32],
         casts: NDArray[np.bool_],
         spheres: SphereTree,
+        area_lights: NDArray[np.void],
     ) -> None:
         """Build the search structures.
 
@@ -38,11 +40,13 @@ class Intersector:
             faces: (m, 3) int32 vertex indices in range.
             casts: (m,) bool, True where the triangle casts shadows.
             spheres: the spheres.
+            area_lights: (l,) AREA_LIGHT, seen but in nobody's way.
         """
         assert vertices.dtype == np.float32 and vertices.ndim == 2 and vertices.shape[1] == 3
         assert faces.dtype == np.int32 and faces.ndim == 2 and faces.shape[1] == 3 and len(casts) == len(faces)
         self.triangles = len(faces)
         self._spheres = spheres
+        self._area_lights = area_lights
         self._seen = _embree_scene(vertices, faces)
         self._casting = self._seen if casts.all() else _embree_scene(vertices, faces[casts])
         self._sphere_casts = bool(spheres.casts.any())
@@ -66,6 +70,9 @@ class Intersector:
             hits = Hits(primitive=found["primID"], distance=found["tfar"], u=found["u"], v=found["v"])
         if len(self._spheres.radius):
             nearest_spheres(self._spheres, origin, direction, self.triangles, hits.distance, hits.primitive)
+        if len(self._area_lights):
+            first = self.triangles + len(self._spheres.radius)
+            nearest_area_lights(self._area_lights, origin, direction, first, hits.distance, hits.primitive)
         return hits
 
     def bare_nearest(self, origin: NDArray[np.float32], direction: NDArray[np.float32]) -> None:

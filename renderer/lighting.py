@@ -8,8 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.area_light import see_light, towards_light
 from renderer.finish import Finish
 from renderer.kernel import formula, kernel
+from renderer.light_samples import LightSamples, light_sample, light_seed
 from renderer.rays import ShadowRays
 from renderer.reflectance import reflectance
 from renderer.surface import OFFSET_ULPS, Surface
@@ -102,6 +104,84 @@ def light_from_points(
         shadows.light[n_shadows, 2] = blue
         shadows.sample[n_shadows] = sample
         n_shadows += 1
+    return n_shadows
+
+
+@formula
+def light_from_areas(
+    s: Surface,
+    material: Any,
+    finish: Finish,
+    wr: float,
+    wg: float,
+    wb: float,
+    dx: float,
+    dy: float,
+    dz: float,
+    sample: int,
+    lights: NDArray[np.void],
+    draws: LightSamples,
+    radiance: NDArray[np.float32],
+    shadows: ShadowRays,
+    n_shadows: int,
+) -> int:
+    """The same as `light_from_points` for lights with a size.
+
+    Args:
+        s, material, finish, wr, wg, wb, dx, dy, dz, sample, radiance, n_shadows: as there.
+        lights: (l,) AREA_LIGHT.
+        draws: the camera samples of the block.
+        shadows: shadow rays; room for another l * draws.each.
+
+    Returns:
+        How many shadow rays there are now.
+    """
+    each = draws.each if draws.depth == 0 else 1
+    for index in range(len(lights)):
+        light = lights[index]
+        if light.reaches == 0:
+            continue
+        view = see_light(light, s.px, s.py, s.pz)
+        if not view.solid_angle > 0.0:
+            continue
+        seed = light_seed(draws.seed[sample], index, draws.depth)
+        for turn in range(each):
+            u, v = light_sample(seed, draws.number[sample] * each + turn)
+            tx, ty, tz, share = towards_light(light, view, s.px, s.py, s.pz, u, v)
+            inverse = 1.0 / math.sqrt(tx * tx + ty * ty + tz * tz)
+            lx, ly, lz = tx * inverse, ty * inverse, tz * inverse
+            cosine = lx * s.nx + ly * s.ny + lz * s.nz
+            if not cosine > 0.0:
+                continue
+            red, green, blue = reflectance(s, material, finish, cosine, lx, ly, lz, -dx, -dy, -dz)
+            share /= each
+            red, green, blue = (
+                wr * red * (light.red * share),
+                wg * green * (light.green * share),
+                wb * blue * (light.blue * share),
+            )
+            if not max(red, max(green, blue)) > 0.0:
+                continue
+            farthest = max(abs(s.px + tx), max(abs(s.py + ty), abs(s.pz + tz)))
+            reach = 1.0 - OFFSET_ULPS * inverse * farthest
+            if light.casts == 0 or not reach > 0.0:
+                radiance[sample, 0] += red
+                radiance[sample, 1] += green
+                radiance[sample, 2] += blue
+                continue
+            away = s.offset + s.lift
+            shadows.origin[n_shadows, 0] = s.px + away * s.gx
+            shadows.origin[n_shadows, 1] = s.py + away * s.gy
+            shadows.origin[n_shadows, 2] = s.pz + away * s.gz
+            shadows.direction[n_shadows, 0] = tx - away * s.gx
+            shadows.direction[n_shadows, 1] = ty - away * s.gy
+            shadows.direction[n_shadows, 2] = tz - away * s.gz
+            shadows.reach[n_shadows] = reach
+            shadows.light[n_shadows, 0] = red
+            shadows.light[n_shadows, 1] = green
+            shadows.light[n_shadows, 2] = blue
+            shadows.sample[n_shadows] = sample
+            n_shadows += 1
     return n_shadows
 
 

@@ -176,6 +176,7 @@ class Renderer:
             request.display,
             quality.samples_per_cell,
             quality.antialiasing,
+            quality.shadow_samples,
             quality.max_depth,
             numbered.identity if quality.map == "scanline" else None,
         )

@@ -15,11 +15,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.area_light import area_light_table
 from renderer.direction import unit
 from renderer.effects import EffectPlan, has_highlight, plan_effects
 from renderer.errors import SceneError
 from renderer.intersection import Intersector
-from renderer.scene import Material, Mesh, Scene, Texture
+from renderer.light_reach import reaching_lights
+from renderer.scene import Material, Mesh, PointLight, Scene, Texture
 from renderer.sphere import SphereTree, build_sphere_tree
 from renderer.tangent import TANGENT, mesh_tangents
 from renderer.texture import TextureAtlas, build_atlas
@@ -71,7 +73,8 @@ class Surfaces(NamedTuple):
         tangents: (m, TANGENT) float32, see `tangent`; (0, TANGENT) where no material is grained.
         spheres: analytic spheres.
         materials: (k,) MATERIAL, each that something visible has.
-        lights: (l,) LIGHT, each that shines.
+        lights: (l,) LIGHT, each point light that can be noticed.
+        area_lights: (a,) AREA_LIGHT, each light with a size that shines.
         surroundings: (3, 3) float64 radiance at the zenith, at the horizon, and from everywhere.
         textures: pictures.
     """
@@ -81,6 +84,7 @@ class Surfaces(NamedTuple):
     spheres: SphereTree
     materials: NDArray[np.void]
     lights: NDArray[np.void]
+    area_lights: NDArray[np.void]
     surroundings: NDArray[np.float64]
     textures: TextureAtlas
 
@@ -134,22 +138,26 @@ def prepare(scene: Scene) -> PreparedScene:
         np.array([row[sphere.material] for sphere in scene.spheres], dtype=np.int32),
         np.array([sphere.casts_shadows for sphere in scene.spheres], dtype=np.uint8),
     )
+    lights = reaching_lights(scene)
+    area_lights = [light for light in scene.lights if not isinstance(light, PointLight) and any(light.radiance)]
     surfaces = Surfaces(
         facets=facets,
         tangents=tangents,
         spheres=spheres,
         materials=_material_table(materials, textures, plan),
         textures=build_atlas(textures),
-        lights=_light_table(scene, plan, center, scale),
+        lights=_light_table([light for light in lights if isinstance(light, PointLight)], plan, center, scale),
+        area_lights=area_light_table(area_lights, lights, center, scale, "soft_shadows" in plan.names),
         surroundings=np.array(
             [scene.surroundings.zenith, scene.surroundings.horizon, scene.surroundings.ambient], dtype=np.float64
         ),
     )
-    intersector = Intersector(vertices, faces, casts, spheres)
+    intersector = Intersector(vertices, faces, casts, spheres, surfaces.area_lights)
     nbytes = facets.nbytes + tangents.nbytes + surfaces.textures.texels.nbytes + EMBREE_BYTES_A_TRIANGLE * len(faces)
     nbytes += sum(mesh.vertices.nbytes + mesh.faces.nbytes for mesh in scene.meshes)
     brightest = max(itertools.chain(scene.surroundings.zenith, scene.surroundings.horizon,
-                                    *(material.emission for material in materials)))  # fmt: skip
+                                    *(material.emission for material in materials),
+                                    *(light.radiance for light in area_lights)))  # fmt: skip
     return PreparedScene(scene, plan, center, scale, brightest, surfaces, intersector, nbytes)
 
 
@@ -210,11 +218,12 @@ def _is_grained(material: Material) -> bool:
     return material.base == "ashikhmin-shirley" and material.exponent_u != material.exponent_v
 
 
-def _light_table(scene: Scene, plan: EffectPlan, center: NDArray[np.float64], scale: float) -> NDArray[np.void]:
-    """Lights in scene units: intensity over squared distance stays the same when both are scaled."""
-    lit = [light for light in scene.lights if any(light.intensity)]
-    table = np.zeros(len(lit), dtype=LIGHT)
-    for row, light in enumerate(lit):
+def _light_table(
+    lights: list[PointLight], plan: EffectPlan, center: NDArray[np.float64], scale: float
+) -> NDArray[np.void]:
+    """Point lights in scene units: intensity over squared distance stays the same when both are scaled."""
+    table = np.zeros(len(lights), dtype=LIGHT)
+    for row, light in enumerate(lights):
         x, y, z = (np.array(light.position) - center) * scale
         red, green, blue = np.array(light.intensity) * (scale * scale)
         table[row] = (x, y, z, red, green, blue, light.casts_shadows and "shadows" in plan.names)

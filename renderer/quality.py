@@ -26,6 +26,8 @@ class Quality:
         samples_per_cell: rays sent from the camera for each cell, 1 to 4096.
         antialiasing: where they go: the first to the cell's centre, the rest at `stochastic` or
             `regular` places over the cell's area.
+        shadow_samples: shadow rays a cell sends to each area light, 1 to 4096, spread over its camera
+            samples: each sends shadow_samples / samples_per_cell of them, rounded up.
         max_depth: how many mirrors and boundaries a ray may meet, 0 to 64.
         acuity: the eye's resolution.
         reconstruction: how cells become pixels: `nearest`, each pixel its cell's colour (the paper's), or
@@ -40,6 +42,7 @@ class Quality:
     samples_per_cell: int = 4
     antialiasing: str = "stochastic"
     max_depth: int = 5
+    shadow_samples: int = 4
     acuity: Acuity = field(default_factory=Acuity)
     reconstruction: str = "nearest"
 
@@ -48,5 +51,6 @@ class Quality:
         require_integer("quality.gaze_bucket_px", self.gaze_bucket_px, 0, MAX_BUCKET_PX)
         require_integer("quality.samples_per_cell", self.samples_per_cell, 1, MAX_SAMPLES)
         require_choice("quality.antialiasing", self.antialiasing, ANTIALIASING)
+        require_integer("quality.shadow_samples", self.shadow_samples, 1, MAX_SAMPLES)
         require_integer("quality.max_depth", self.max_depth, 0, MAX_DEPTH)
         require_choice("quality.reconstruction", self.reconstruction, RECONSTRUCTIONS)

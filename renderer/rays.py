@@ -44,7 +44,8 @@ class Hits(NamedTuple):
     """Nearest hits of rays.
 
     Attributes:
-        primitive: (n,) int32: a triangle, a sphere (numbered after the triangles) or -1 for nothing.
+        primitive: (n,) int32: a triangle, a sphere (numbered after the triangles), an area light (numbered after
+            the spheres) or -1 for nothing.
         distance: (n,) float32 in lengths of the direction; meaningless for a miss.
         u, v: (n,) float32 barycentric weights of a triangle's second and third corner.
     """

@@ -5,6 +5,7 @@ Nothing here knows how the scene is traced; `prepared` turns it into what the ke
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 
 from renderer.camera import Camera
 from renderer.camera_path import CameraPath
-from renderer.errors import SceneError, SettingsError, require_choice, require_number
+from renderer.errors import SceneError, SettingsError, require_choice, require_number, require_point
 
 Rgb = tuple[float, float, float]
 
@@ -29,6 +30,10 @@ BASES = ("phong", "ashikhmin-shirley")
 
 MAX_RADIANCE = 1e12
 """Largest radiance or intensity a scene may state; keeps every product finite in float32."""
+
+
+RIGHT_ANGLE = 1e-4
+"""Largest cosine between the edges of a rectangle: what coordinates of five digits round to."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -206,6 +211,83 @@ class PointLight:
         require_rgb("light.intensity", self.intensity, 1e24)
 
 
+class RectangleError(SceneError):
+    """Edges that make no rectangle; `field` names the one at fault."""
+
+    def __init__(self, field: str, expected: str, found: object) -> None:
+        super().__init__(f"light.{field}: expected {expected}, found {found}")
+        self.field = field
+        self.expected = expected
+        self.found = found
+
+
+@dataclass(frozen=True, slots=True)
+class RectangleLight:
+    """A rectangle that shines evenly in all directions of its side; its shadows are soft.
+
+    It is seen by rays on the side that shines, not from behind, and casts no shadow itself.
+
+    Attributes:
+        corner: one corner [m].
+        edge_u, edge_v: the edges that start there [m], at right angles; the side they wind around
+            counter-clockwise (edge_u x edge_v points out of it) shines.
+        radiance: [W/(sr m^2)], 0 or more each.
+        two_sided: whether the other side shines too.
+        casts_shadows: False lights through everything.
+
+    Raises:
+        SettingsError: naming the field, for a value out of range.
+        RectangleError: for an edge without length, or edges that are not at right angles.
+    """
+
+    corner: tuple[float, float, float]
+    edge_u: tuple[float, float, float]
+    edge_v: tuple[float, float, float]
+    radiance: Rgb
+    two_sided: bool = False
+    casts_shadows: bool = True
+
+    def __post_init__(self) -> None:
+        require_point("light.corner", self.corner, MAX_COORDINATE_M)
+        require_point("light.edge_u", self.edge_u, MAX_COORDINATE_M)
+        require_point("light.edge_v", self.edge_v, MAX_COORDINATE_M)
+        require_rgb("light.radiance", self.radiance, MAX_RADIANCE)
+        for name, edge in (("edge_u", self.edge_u), ("edge_v", self.edge_v)):
+            if not math.hypot(*edge) > 0.0:
+                raise RectangleError(name, "an edge with a length", edge)
+        u, v = (np.array(edge) / math.hypot(*edge) for edge in (self.edge_u, self.edge_v))
+        if not abs(float(u @ v)) <= RIGHT_ANGLE:
+            raise RectangleError("edge_v", f"an edge at right angles to edge_u {self.edge_u}", self.edge_v)
+
+
+@dataclass(frozen=True, slots=True)
+class SphereLight:
+    """A sphere that shines evenly outwards; its shadows are soft.
+
+    It is seen by rays from outside, and casts no shadow itself; inside it there is no light.
+
+    Attributes:
+        center: [m].
+        radius: [m], above 0.
+        radiance: [W/(sr m^2)], 0 or more each.
+        casts_shadows: False lights through everything.
+    """
+
+    center: tuple[float, float, float]
+    radius: float
+    radiance: Rgb
+    casts_shadows: bool = True
+
+    def __post_init__(self) -> None:
+        require_point("light.center", self.center, MAX_COORDINATE_M)
+        require_number("light.radius", self.radius, 0.0, MAX_COORDINATE_M, open_low=True)
+        require_rgb("light.radiance", self.radiance, MAX_RADIANCE)
+
+
+AreaLight = RectangleLight | SphereLight
+Light = PointLight | RectangleLight | SphereLight
+
+
 @dataclass(frozen=True, slots=True)
 class Surroundings:
     """What rays that leave the scene see, and the light that comes from everywhere.
@@ -241,7 +323,7 @@ class Scene:
 
     meshes: tuple[Mesh, ...] = ()
     spheres: tuple[Sphere, ...] = ()
-    lights: tuple[PointLight, ...] = ()
+    lights: tuple[Light, ...] = ()
     surroundings: Surroundings = field(default_factory=Surroundings)
     camera: Camera = field(default_factory=Camera)
     exposure: float = 1.0

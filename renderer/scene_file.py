@@ -68,6 +68,20 @@ kind = "point"
 position = [2.0, 3.0, 2.0]
 intensity = [40.0, 40.0, 40.0]     # W/sr, inverse-square falloff
 casts_shadows = true
+
+[[light]]
+kind = "rectangle"
+corner = [-0.5, 2.5, -0.5]
+edge_u = [1.0, 0.0, 0.0]           # the two edges from there, at right angles;
+edge_v = [0.0, 0.0, 1.0]           # the side around which they run counter-clockwise shines
+radiance = [9.0, 9.0, 9.0]         # W/(sr m^2)
+two_sided = false                  # or false
+
+[[light]]
+kind = "sphere"
+center = [-1.0, 1.5, 0.5]
+radius = 0.1
+radiance = [20.0, 18.0, 15.0]
 ```
 
 Files are named from the folder on, and must lie inside it.
@@ -101,12 +115,16 @@ from renderer.scene import (
     MAX_COORDINATE_M,
     MAX_RADIANCE,
     MAX_SHININESS,
+    Light,
     Material,
     Mesh,
     PointLight,
+    RectangleError,
+    RectangleLight,
     Rgb,
     Scene,
     Sphere,
+    SphereLight,
     Surroundings,
     Texture,
 )
@@ -167,7 +185,7 @@ class _Reader:
             self.materials[name] = self._material(materials.table(name), name)
         meshes = [mesh for fields in top.tables("mesh") for mesh in self._meshes(fields)]
         spheres = [self._sphere(fields) for fields in top.tables("sphere")]
-        lights = tuple(_light(fields) for fields in top.tables("light"))
+        lights: tuple[Light, ...] = tuple(_light(fields) for fields in top.tables("light"))
         surroundings = _surroundings(top.table("surroundings")) if "surroundings" in top else STUDIO
         if self.ambient != BLACK:
             red, green, blue = (a + b for a, b in zip(surroundings.ambient, self.ambient, strict=True))
@@ -291,13 +309,34 @@ class _Reader:
         return sphere
 
 
-def _light(fields: Fields) -> PointLight:
-    fields.choice("kind", ("point",))
-    light = PointLight(
-        fields.point("position", MAX_COORDINATE_M),
-        fields.rgb("intensity", MAX_INTENSITY),
-        fields.flag("casts_shadows", True),
-    )
+def _light(fields: Fields) -> Light:
+    kind = fields.choice("kind", ("point", "rectangle", "sphere"))
+    light: Light
+    try:
+        if kind == "point":
+            light = PointLight(
+                fields.point("position", MAX_COORDINATE_M),
+                fields.rgb("intensity", MAX_INTENSITY),
+                fields.flag("casts_shadows", True),
+            )
+        elif kind == "sphere":
+            light = SphereLight(
+                fields.point("center", MAX_COORDINATE_M),
+                fields.number("radius", 0.0, MAX_COORDINATE_M, open_low=True),
+                fields.rgb("radiance", MAX_RADIANCE),
+                fields.flag("casts_shadows", True),
+            )
+        else:
+            light = RectangleLight(
+                fields.point("corner", MAX_COORDINATE_M),
+                fields.point("edge_u", MAX_COORDINATE_M),
+                fields.point("edge_v", MAX_COORDINATE_M),
+                fields.rgb("radiance", MAX_RADIANCE),
+                fields.flag("two_sided", False),
+                fields.flag("casts_shadows", True),
+            )
+    except RectangleError as error:
+        raise fields.refuse(error.field, error.expected, error.found) from None
     fields.refuse_unknown()
     return light
 

@@ -11,7 +11,8 @@ from renderer.finish import Finish
 from renderer.fresnel import fresnel, refracted_cosine
 from renderer.grain import sphere_tangent, triangle_tangent
 from renderer.kernel import formula, kernel, prefetch
-from renderer.lighting import light_from_points
+from renderer.light_samples import LightSamples
+from renderer.lighting import light_from_areas, light_from_points
 from renderer.prepared import BOUNDARY, GRAINED, LIT, MIRROR, Surfaces
 from renderer.rays import Hits, Rays, ShadowRays
 from renderer.reflectance import even_light
@@ -63,6 +64,7 @@ def shade(
     hits: Hits,
     spawn: bool,
     cutoff: float,
+    draws: LightSamples,
     children: Rays,
     shadows: ShadowRays,
     radiance: NDArray[np.float32],
@@ -75,21 +77,24 @@ def shade(
         rays, hits: n rays and what they met.
         spawn: whether mirrors and boundaries may send further rays.
         cutoff: smallest weight worth a ray.
+        draws: where on area lights the samples look.
         children: room for 2n rays.
-        shadows: room for n * lights shadow rays.
+        shadows: room for n * (lights + area lights * draws.each) shadow rays.
         radiance: (samples, 3) float32, added to.
         counters: (COUNTERS,) int64, set.
     """
     # Arrays are taken out of their records once: doing it in the loop counts references for each ray.
     facets, tangents = surfaces.facets, surfaces.tangents
     center, radius, sphere_material = surfaces.spheres.center, surfaces.spheres.radius, surfaces.spheres.material
-    materials, lights, around = surfaces.materials, surfaces.lights, surfaces.surroundings
+    materials, around = surfaces.materials, surfaces.surroundings
+    lights, area_lights = surfaces.lights, surfaces.area_lights
     texels, pictures, linear = surfaces.textures.texels, surfaces.textures.pictures, surfaces.textures.linear
     origin, direction, weight, sample_of = rays.origin, rays.direction, rays.weight, rays.sample
     primitive_of, hit_u, hit_v = hits.primitive, hits.u, hits.v
     child_origin, child_direction = children.origin, children.direction
     child_weight, child_sample = children.weight, children.sample
     triangles = len(facets)
+    solids = triangles + len(radius)
     counters[:] = 0
     n_children = 0
     n_shadows = 0
@@ -109,6 +114,12 @@ def shade(
             continue
         if primitive < triangles:
             s = triangle_surface(facets, primitive, np.float64(hit_u[ray]), np.float64(hit_v[ray]), dx, dy, dz)
+        elif primitive >= solids:
+            lamp = area_lights[primitive - solids]
+            radiance[sample, 0] += wr * lamp.red
+            radiance[sample, 1] += wg * lamp.green
+            radiance[sample, 2] += wb * lamp.blue
+            continue
         else:
             k = primitive - triangles
             s = sphere_surface(
@@ -140,6 +151,9 @@ def shade(
         if material.calls & LIT != 0:
             n_shadows = light_from_points(
                 s, material, finish, wr, wg, wb, dx, dy, dz, sample, lights, radiance, shadows, n_shadows
+            )
+            n_shadows = light_from_areas(
+                s, material, finish, wr, wg, wb, dx, dy, dz, sample, area_lights, draws, radiance, shadows, n_shadows
             )
         if not spawn or material.calls & (MIRROR | BOUNDARY) == 0:
             continue

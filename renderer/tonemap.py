@@ -8,6 +8,9 @@ from numpy.typing import NDArray
 from renderer.kernel import formula
 from renderer.texture import srgb_to_linear
 
+SMALLEST_STEP = 0.5 / 255 / 12.92
+"""Half the smallest step of an 8-bit sRGB code, in linear light: the least that lifts black to code 1."""
+
 LOWEST_EXPONENT = -13
 """2^-13 is below the first threshold, 0.5/255/12.92."""
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from renderer.camera import Camera
-from renderer.scene import Material, Mesh, PointLight, Scene, Sphere, Texture
+from renderer.scene import Material, Mesh, PointLight, RectangleLight, Scene, Sphere, SphereLight, Texture
 
 
 def every_effect() -> Scene:
-    """A textured smooth floor, a mirror and a glass ball, lit with shadows."""
+    """A textured smooth floor, a mirror and a glass ball, lit by each kind of light with shadows."""
     checks = Texture(np.array([[[255] * 3, [90] * 3], [[90] * 3, [255] * 3]], dtype=np.uint8), "checks")
     floor = Mesh(
         vertices=np.array([[-9, 0, -9], [9, 0, -9], [9, 0, 9], [-9, 0, 9]], dtype=np.float64),
@@ -24,6 +24,10 @@ def every_effect() -> Scene:
             Sphere((-1.0, 1.0, 0.0), 1.0, Material("mirror", reflection=(0.8, 0.8, 0.8), base="ashikhmin-shirley")),
             Sphere((1.0, 1.0, 0.0), 1.0, Material("glass", diffuse=(0.0, 0.0, 0.0), transmission=(1.0, 1.0, 1.0))),
         ),
-        lights=(PointLight((3.0, 8.0, 5.0), (400.0, 400.0, 400.0)),),
+        lights=(
+            PointLight((3.0, 8.0, 5.0), (400.0, 400.0, 400.0)),
+            RectangleLight((-1.0, 5.0, -1.0), (2.0, 0.0, 0.0), (0.0, 0.0, 2.0), (5.0, 5.0, 5.0)),
+            SphereLight((-4.0, 3.0, 2.0), 0.5, (5.0, 5.0, 5.0)),
+        ),
         camera=Camera((0.0, 2.0, 7.0), (0.0, 1.0, 0.0)),
     )

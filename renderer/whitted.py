@@ -11,21 +11,20 @@ from numpy.typing import NDArray
 from renderer.camera import Camera, ViewFrame, view_frame
 from renderer.display import Display
 from renderer.frame import RayCounts
+from renderer.light_samples import LightSamples, seed_samples
 from renderer.lighting import add_unblocked
 from renderer.prepared import PreparedScene
 from renderer.quality import Quality
 from renderer.rays import Rays, first_shadow_rays, make_rays, make_shadow_rays, some_rays
 from renderer.sampling import camera_rays, lattice_order, lattice_step
 from renderer.shading import CHILDREN, COUNTERS, REFLECTIONS, REFRACTIONS, SHADOWS, shade
+from renderer.tonemap import SMALLEST_STEP
 
 BLOCK_RAYS = 8192
 """Rays traced together: what they carry stays in a core's second-level cache."""
 
 MAX_BLOCK_SHADOW_RAYS = 65_536
 """Bound on the shadow rays of a block; a scene of many lights gets smaller blocks."""
-
-SMALLEST_STEP = 0.5 / 255 / 12.92
-"""Half the smallest step of an 8-bit sRGB code, in linear light: less cannot change a pixel."""
 
 
 class View(NamedTuple):
@@ -69,6 +68,8 @@ class _Scratch:
         self.levels = [make_rays(2 * capacity)]
         self.shadows = make_shadow_rays(shadow_rays)
         self.counters = np.zeros(COUNTERS, dtype=np.int64)
+        self.seed = np.zeros(capacity, dtype=np.uint64)
+        self.number = np.zeros(capacity, dtype=np.int32)
 
     def level(self, depth: int) -> Rays:
         while len(self.levels) <= depth:
@@ -85,10 +86,20 @@ def view_of(prepared: PreparedScene, camera: Camera, display: Display) -> View:
     return View(view_frame(camera, display), position.astype(np.float32), display.width_px, display.height_px)
 
 
-def block_rays(prepared: PreparedScene) -> int:
+def block_rays(prepared: PreparedScene, quality: Quality) -> int:
     """Rays traced together in this scene."""
-    lights = len(prepared.surfaces.lights)
-    return max(64, min(BLOCK_RAYS, MAX_BLOCK_SHADOW_RAYS // max(1, lights)))
+    return max(64, min(BLOCK_RAYS, MAX_BLOCK_SHADOW_RAYS // max(1, _most_shadow_rays(prepared, quality))))
+
+
+def shadow_rays_each(quality: Quality) -> int:
+    """Shadow rays that each camera sample of a cell sends to each area light: its share of the cell's."""
+    return max(1, -(-quality.shadow_samples // quality.samples_per_cell))
+
+
+def _most_shadow_rays(prepared: PreparedScene, quality: Quality) -> int:
+    """Most shadow rays that one surface point sends."""
+    surfaces = prepared.surfaces
+    return len(surfaces.lights) + len(surfaces.area_lights) * shadow_rays_each(quality)
 
 
 def trace_cells(
@@ -99,7 +110,7 @@ def trace_cells(
     Args:
         prepared: the scene.
         view: the camera.
-        cells: which cells and samples; these should not exceed `block_rays(prepared)` unless it is a
+        cells: which cells and samples; these should not exceed `block_rays` unless it is a
             single cell.
         quality: samples a cell gets in the end, antialiasing and depth.
 
@@ -107,16 +118,18 @@ def trace_cells(
         (samples, 3) float32 radiance, the samples of a cell after one another, and the rays traced.
     """
     n = int((cells.until - cells.first).sum())
-    block = block_rays(prepared)
-    scratch = _scratch(max(block, n), block * len(prepared.surfaces.lights))
+    block = block_rays(prepared, quality)
+    scratch = _scratch(max(block, n), block * _most_shadow_rays(prepared, quality))
     points = quality.samples_per_cell
     step = lattice_step(points) if quality.antialiasing == "regular" else 0
     camera_rays(
         view.frame, view.origin, view.width, view.height, cells.x, cells.y, cells.side, cells.chosen,
         cells.first, cells.until, points, step, lattice_order(points), scratch.level(0),
     )  # fmt: skip
+    if len(prepared.surfaces.area_lights):
+        seed_samples(cells.x, cells.y, cells.side, cells.chosen, cells.first, cells.until, scratch.seed, scratch.number)
     radiance = np.zeros((n, 3), dtype=np.float32)
-    counts = _follow(prepared, scratch, n, block, quality.max_depth, radiance)
+    counts = _follow(prepared, scratch, n, block, quality, radiance)
     return radiance, counts
 
 
@@ -132,7 +145,7 @@ def _scratch(capacity: int, shadow_rays: int) -> _Scratch:
 
 
 def _follow(
-    prepared: PreparedScene, scratch: _Scratch, n: int, block: int, max_depth: int, radiance: NDArray[np.float32]
+    prepared: PreparedScene, scratch: _Scratch, n: int, block: int, quality: Quality, radiance: NDArray[np.float32]
 ) -> RayCounts:
     """Trace `n` camera rays of level 0 and all that they spawn, the deepest pending level first.
 
@@ -153,7 +166,8 @@ def _follow(
         stop = batch_end(rays.sample, start, end, block)
         pending[depth][0] = stop
         batch = some_rays(rays, start, stop)
-        spawned = _shade_batch(prepared, scratch, batch, depth, depth < max_depth, cutoff, radiance)
+        draws = LightSamples(scratch.seed, scratch.number, shadow_rays_each(quality), depth)
+        spawned = _shade_batch(prepared, scratch, batch, draws, depth < quality.max_depth, cutoff, radiance)
         shadow_rays += int(spawned[SHADOWS])
         reflections += int(spawned[REFLECTIONS])
         refractions += int(spawned[REFRACTIONS])
@@ -183,7 +197,7 @@ def _shade_batch(
     prepared: PreparedScene,
     scratch: _Scratch,
     batch: Rays,
-    depth: int,
+    draws: LightSamples,
     spawn: bool,
     cutoff: float,
     radiance: NDArray[np.float32],
@@ -191,7 +205,10 @@ def _shade_batch(
     """Trace one batch of rays, add what they see, and leave their children on the next level."""
     hits = prepared.intersector.nearest(batch.origin, batch.direction)
     counters = scratch.counters
-    shade(prepared.surfaces, batch, hits, spawn, cutoff, scratch.level(depth + 1), scratch.shadows, radiance, counters)
+    children = scratch.level(draws.depth + 1)
+    shade(
+        prepared.surfaces, batch, hits, spawn, cutoff, draws, children, scratch.shadows, radiance, counters
+    )  # fmt: skip
     pending = int(counters[SHADOWS])
     if pending:
         shadows = first_shadow_rays(scratch.shadows, pending)

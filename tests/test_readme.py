@@ -140,7 +140,7 @@ def test_the_scene_file_is_read_as_it_stands(tmp_path: Path) -> None:
     assert scene.title == "A vase on a table"
     assert [mesh.material.name for mesh in scene.meshes] == ["gold"]
     assert [sphere.material.name for sphere in scene.spheres] == ["glass"]
-    assert len(scene.lights) == 1
+    assert len(scene.lights) == 3
     assert scene.camera_path is not None
 
 

@@ -111,7 +111,7 @@ def test_reasons_can_be_read() -> None:
     reasons = {effect.name: effect.reason for effect in plan_effects(scene).effects}
     assert reasons == {
         "textures": "2 triangles of material 'tiles'",
-        "shadows": "2 lights, 4 shadow-casting objects",
+        "shadows": "2 point lights, 4 shadow-casting objects",
         "reflection": "2 spheres of material 'glass'; 1 sphere of material 'mirror'",
         "refraction": "2 spheres of material 'glass'",
     }

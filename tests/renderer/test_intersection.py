@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from renderer.area_light import AREA_LIGHT
 from renderer.intersection import Intersector
 from renderer.sphere import build_sphere_tree
 from tests.renderer.drawing import icosphere
@@ -30,7 +31,11 @@ def intersector(
     tree = build_sphere_tree(table[:, :3], table[:, 3], np.zeros(k, np.int32), np.ones(k, np.uint8))
     every = np.ones(len(faces), np.bool_)
     return Intersector(
-        vertices.astype(np.float32), faces.astype(np.int32).reshape(-1, 3), every if casts is None else casts, tree
+        vertices.astype(np.float32),
+        faces.astype(np.int32).reshape(-1, 3),
+        every if casts is None else casts,
+        tree,
+        np.zeros(0, dtype=AREA_LIGHT),
     )
 
 

@@ -15,7 +15,7 @@ import renderer.scene_file
 from renderer.errors import SceneError
 from renderer.framing import DEFAULT_MATERIAL, STUDIO, frame_model
 from renderer.model import Model
-from renderer.scene import Scene, Surroundings
+from renderer.scene import PointLight, RectangleLight, Scene, SphereLight, Surroundings
 from renderer.scene_file import load_scene_folder
 from tests.renderer.model_files import gltf
 
@@ -75,8 +75,11 @@ def test_the_worked_example(folder: Path) -> None:
     assert scene.meshes[0].material.reflection == (0.5, 0.4, 0.2)
     assert scene.spheres[0].material.transmission == (1.0, 1.0, 1.0)
     assert scene.spheres[0].radius == 0.1
-    assert scene.lights[0].intensity == (40.0, 40.0, 40.0)
-    assert scene.lights[0].position == (2.0, 3.0, 2.0)
+    assert scene.lights == (
+        PointLight((2.0, 3.0, 2.0), (40.0, 40.0, 40.0)),
+        RectangleLight((-0.5, 2.5, -0.5), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (9.0, 9.0, 9.0)),
+        SphereLight((-1.0, 1.5, 0.5), 0.1, (20.0, 18.0, 15.0)),
+    )
 
 
 def test_the_worked_example_shows_every_field(folder: Path) -> None:
@@ -94,6 +97,10 @@ def test_the_worked_example_shows_every_field(folder: Path) -> None:
         key: set(value[0] if isinstance(value, list) else value) for key, value in stated.items() if key in expected
     }
     assert {"": set(stated)} | found == expected
+    assert [set(light) for light in stated["light"][1:]] == [
+        {"kind", "corner", "edge_u", "edge_v", "radiance", "two_sided"},
+        {"kind", "center", "radius", "radiance"},
+    ]
     fields = set().union(*stated["materials"].values())
     assert fields | {"emission"} == {
         "diffuse", "specular", "shininess", "emission", "reflection", "transmission", "ior", "diffuse_texture",
@@ -161,6 +168,9 @@ def test_what_is_given_is_taken(folder: Path) -> None:
     assert scene.spheres[0].material is DEFAULT_MATERIAL
     only_camera = load(folder, "light = []\n[camera]\nposition = [0, 0, 1]\nlook_at = [0, 0, 0]\n")
     assert only_camera.meshes == ()
+
+
+RECTANGLE = "[[light]]\nkind = 'rectangle'\ncorner = [0, 0, 0]\nradiance = [1, 1, 1]\nedge_u = [1, 0, 0]\n"
 
 
 @pytest.mark.parametrize(
@@ -232,8 +242,13 @@ def test_what_is_given_is_taken(folder: Path) -> None:
         ("[materials.red]\ndiffuse_texture = 'vase.obj'", "vase/vase.obj: expected an image that can be read"),
         ("[[sphere]]\ncenter = [0, 0, 0]", "vase/scene.toml: sphere[0].radius: expected a number, found nothing"),
         ("[[sphere]]\ncenter = [0, 0, 0]\nradius = 0", "vase/scene.toml: sphere[0].radius: expected a number in (0"),
-        ("[[light]]\nposition = [0, 0, 0]", "vase/scene.toml: light[0].kind: expected one of point, found nothing"),
-        ("[[light]]\nkind = 'sun'", "vase/scene.toml: light[0].kind: expected one of point, found 'sun'"),
+        ("[[light]]\nposition = [0, 0, 0]", "vase/scene.toml: light[0].kind: expected one of point, rectangle, sphere"),
+        ("[[light]]\nkind = 'sun'", "vase/scene.toml: light[0].kind: expected one of point, rectangle, sphere"),
+        (
+            RECTANGLE + "edge_v = [2, 0, 0]",
+            "vase/scene.toml: light[0].edge_v: expected an edge at right angles to edge_u",
+        ),
+        (RECTANGLE + "edge_v = [0, 0, 0]", "vase/scene.toml: light[0].edge_v: expected an edge with a length, found"),
         ("title = 'a\nb'", "vase/scene.toml: expected TOML, found a mistake:"),
         ("", "vase/scene.toml: expected something to show, found no triangle and no sphere"),
     ],

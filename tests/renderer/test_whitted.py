@@ -13,7 +13,7 @@ from renderer.camera import Camera
 from renderer.fresnel import fresnel, refracted_cosine
 from renderer.pipeline import Renderer
 from renderer.scene import Material, Rgb, Scene, Sphere, Surroundings, Texture
-from renderer.whitted import SMALLEST_STEP
+from renderer.tonemap import SMALLEST_STEP
 from tests.renderer.drawing import (
     BLACK,
     EVERYWHERE_1,
