@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -64,3 +65,9 @@ class Folder:
         if not path.is_relative_to(self.root) or path == self.root:
             raise SceneError(f"{wanted_by}: expected a file inside the folder {self.label or '.'}, found {name!r}")
         return path
+
+
+def percent_decoded(uri: str) -> str:
+    """A relative URI as a path: %20 is a blank."""
+    plain = re.sub(rb"%([0-9a-fA-F]{2})", lambda match: bytes([int(match[1], 16)]), uri.encode("utf-8", "replace"))
+    return plain.decode("utf-8", "replace")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import binascii
-import re
 from dataclasses import dataclass, field
 from typing import Any, Final
 
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 
 from renderer.errors import SceneError
 from renderer.fields import Fields
-from renderer.folder import Folder
+from renderer.folder import Folder, percent_decoded
 
 LARGEST_INDEX: Final = 2**40
 """Above every index, offset and length of a file that fits in memory."""
@@ -151,8 +150,6 @@ class GltfData:
                 raise SceneError(
                     f"{self.top.file}: {owner.where('uri')}: expected base64 data, found: {error}"
                 ) from None
-        plain = re.sub(rb"%([0-9a-fA-F]{2})", lambda match: bytes([int(match[1], 16)]), uri.encode("utf-8", "replace"))
-        data, inner = self.folder.read(
-            plain.decode("utf-8", "replace"), f"{self.top.file}: {owner.where('uri')}", self.inner
-        )
+        where = f"{self.top.file}: {owner.where('uri')}"
+        data, inner = self.folder.read(percent_decoded(uri), where, self.inner)
         return data, self.folder.file_label(inner)

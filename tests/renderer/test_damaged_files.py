@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import json
 import signal
+import struct
 import tracemalloc
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -17,7 +18,18 @@ import trimesh
 from renderer.errors import SceneError
 from renderer.mesh_file import load_model
 from renderer.model import Model
-from tests.renderer.model_files import COLOURED, SQUARE, glb, gltf, ply, png
+from tests.renderer.model_files import (
+    COLOURED,
+    SQUARE,
+    chunk,
+    glb,
+    gltf,
+    ply,
+    png,
+    three_ds,
+    three_ds_cube,
+    three_ds_object,
+)
 
 MUTATIONS = 150
 """Damaged copies of each file."""
@@ -51,8 +63,24 @@ def good_files() -> dict[str, bytes]:
         "little.ply": ply("binary_little_endian", [[0, 1, 2], [0, 1, 2, 3]]),
         "big.ply": ply("binary_big_endian", [[0, 1, 2], [0, 2, 3]], COLOURED),
         "binary.stl": trimesh.exchange.stl.export_stl(box),
+        "a.3ds": a_3ds(),
         "text.stl": trimesh.exchange.stl.export_stl_ascii(box).encode(),
     }
+
+
+def a_3ds() -> bytes:
+    """A cube with everything that is read of a 3DS file."""
+    picture = chunk(0xA200, chunk(0xA300, b"t.png\0"))
+    spot = chunk(0x4610, struct.pack("<5f", 0, 0, 0, 30, 40))
+    of_faces = chunk(0x4130, b"m\0", struct.pack("<3H", 2, 0, 5)) + chunk(0x4150, struct.pack("<12I", *range(12)))
+    uvs = chunk(0x4140, struct.pack("<H16f", 8, *range(16)))
+    matrix = chunk(0x4160, struct.pack("<12f", -1, 0, 0, 0, 1, 0, 0, 0, 1, 3, 0, 0))
+    return three_ds(
+        chunk(0xAFFF, chunk(0xA000, b"m\0"), chunk(0xA020, chunk(0x0011, b"\1\2\3")), picture),
+        three_ds_object("Lamp", chunk(0x4600, struct.pack("<3f", 1, 2, 3), spot)),
+        three_ds_object("Eye", chunk(0x4700, struct.pack("<8f", 0, -5, 1, 0, 0, 1, 0, 40))),
+        three_ds_object("Box", three_ds_cube(uvs, matrix, in_faces=of_faces)),
+    )
 
 
 def damaged(good: bytes, generator: np.random.Generator) -> Iterator[bytes]:
