@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import time
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 
@@ -13,7 +14,7 @@ from starlette.middleware.cors import CORSMiddleware
 
 from renderer.library import SceneLibrary
 from renderer.pipeline import Renderer
-from service import cells, frames, pages, scenes
+from service import cells, frames, pages, scenes, stream
 from service.access import OwnNamesOnly, SafeHeaders, SmallBodiesOnly, TokenOnly
 from service.catalogue import Catalogue
 from service.desk import Desk
@@ -21,7 +22,9 @@ from service.jobs import JobQueue
 from service.openapi import describe_api
 from service.problem import answer_errors
 from service.rendering import Studio
+from service.sessions import Sessions
 from service.settings import Settings
+from service.stage import Stage
 
 LOOKUP_THREADS = 4
 QUEUED_LOOKUPS = 64
@@ -31,7 +34,10 @@ log = logging.getLogger(__name__)
 
 
 def create_app(
-    settings: Settings, renderer: Renderer | None = None, announce: Callable[[str], None] = log.info
+    settings: Settings,
+    renderer: Renderer | None = None,
+    announce: Callable[[str], None] = log.info,
+    clock: Callable[[], int] = time.monotonic_ns,
 ) -> FastAPI:
     """The application.
 
@@ -39,22 +45,27 @@ def create_app(
         settings: limits and access.
         renderer: renders for this application and others; None for one of its own.
         announce: receives a line when the kernels begin to compile and one when frames can be rendered.
+        clock: of the sessions, monotonic [ns].
     """
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         own = renderer or Renderer(settings.threads, settings.map_cache_bytes, settings.store_bytes)
         library = SceneLibrary(settings.scenes, settings.scene_bytes)
+        studio = Studio(settings, own, library)
         desk = Desk(
-            Studio(settings, own, library),
+            studio,
             Catalogue(library),
             JobQueue("gazetrace-render", settings.max_concurrent_renders, settings.max_queued_renders),
             JobQueue("gazetrace-lookup", LOOKUP_THREADS, QUEUED_LOOKUPS),
+            Sessions(settings, Stage(studio, settings.max_concurrent_renders), clock),
         )
         app.state.desk = desk
         desk.studio.warm_up(announce)
+        desk.sessions.open()
         yield
         desk.studio.close()
+        desk.sessions.close()
         desk.renders.close()
         desk.lookups.close()
         if renderer is None:
@@ -69,7 +80,7 @@ def create_app(
         redirect_slashes=False,
     )
     answer_errors(app)
-    for part in (frames, cells, scenes, pages):
+    for part in (frames, cells, scenes, stream, pages):
         app.include_router(part.router)
     describe_api(app, settings)
     return app

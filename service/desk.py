@@ -11,6 +11,7 @@ from fastapi import Depends, Request
 from service.catalogue import Catalogue
 from service.jobs import JobQueue
 from service.rendering import Studio
+from service.sessions import Sessions
 
 Result = TypeVar("Result")
 
@@ -24,12 +25,14 @@ class Desk:
         catalogue: describes scenes.
         renders: queue of whole frames.
         lookups: queue of what is quick, so that it does not wait behind frames.
+        sessions: of viewers and gaze sources.
     """
 
     studio: Studio
     catalogue: Catalogue
     renders: JobQueue
     lookups: JobQueue
+    sessions: Sessions
 
     async def render(self, request: Request, job: Callable[[], Result]) -> Result:
         """Run a job of the kind that takes a whole frame's time."""

@@ -122,14 +122,14 @@ def _http(request: Request, error: Exception) -> Response:
 
 def _invalid(_: Request, error: Exception) -> Response:
     assert isinstance(error, RequestValidationError)
-    errors = [_field_error(item) for item in error.errors()]
+    errors = [field_error(item) for item in error.errors()]
     return problem(422, "; ".join(f"{item.field}: {item.message}" for item in errors), "invalid-request", errors)
 
 
 def _settings(request: Request, error: Exception) -> Response:
     assert isinstance(error, SettingsError)
     item = FieldError(
-        field=_as_asked(error.field, request), message=f"expected {error.expected}, found {_shown(error.found)}"
+        field=_as_asked(error.field, request), message=f"expected {error.expected}, found {shown(error.found)}"
     )
     return problem(422, f"{item.field}: {item.message}", "invalid-request", [item])
 
@@ -151,7 +151,7 @@ def _mistake(request: Request, _: Exception) -> Response:
     return problem(500, f"{request.method} {request.url.path} failed by a mistake of the service; its log says more")
 
 
-def _field_error(item: Mapping[str, object]) -> FieldError:
+def field_error(item: Mapping[str, object]) -> FieldError:
     """One of pydantic's errors in the terms of the request."""
     location = item["loc"]
     assert isinstance(location, Sequence)
@@ -168,10 +168,10 @@ def _field_error(item: Mapping[str, object]) -> FieldError:
     if item["type"] == "missing":
         return FieldError(field=field, message="is required")
     expected = str(item["msg"]).removeprefix("Input should be ").removeprefix("Input should ")
-    return FieldError(field=field, message=f"expected {expected}, found {_shown(item['input'])}")
+    return FieldError(field=field, message=f"expected {expected}, found {shown(item['input'])}")
 
 
-def _shown(value: object) -> str:
+def shown(value: object) -> str:
     """A value as a message repeats it: short, printable."""
     if isinstance(value, bytes):
         value = value.decode(errors="replace")

@@ -66,7 +66,8 @@ Id = Annotated[int, Between(0, MAX_ID)]
 Count = Annotated[int, Between(0, MAX_INTEGER)]
 TimeNs = Annotated[int, Between(-MAX_INTEGER, MAX_INTEGER)]
 Coordinate = Annotated[float, Between(-MAX_COORDINATE, MAX_COORDINATE)]
-Text = Annotated[str, Length(4096)]
+LONGEST_TEXT = 4096
+Text = Annotated[str, Length(LONGEST_TEXT)]
 SessionName = Annotated[str, Matching(r"[A-Za-z0-9_-]{1,64}")]
 Unit = Literal["px", "fraction"]
 EyePhase = Literal["fixation", "saccade", "pursuit", "blink"]
@@ -271,12 +272,14 @@ class Error(Record):
         code: the kind, as in the HTTP problems: `invalid-request`, `over-limit`, `unknown-scene`, ...
         message: one line fit to show.
         field: dotted path of the wrong field.
+        id: of the configuration that was refused.
     """
 
     type: ClassVar = "error"
     code: Text
     message: Text
     field: Text | None = None
+    id: Id | None = None
 
 
 @dataclass(frozen=True, slots=True)

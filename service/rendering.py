@@ -19,6 +19,7 @@ from renderer.frame import Frame, FrameCost, FrameRequest
 from renderer.gaze import Gaze
 from renderer.library import SceneLibrary
 from renderer.pipeline import Renderer
+from renderer.prepared import PreparedScene
 from renderer.quality import Quality
 from service.settings import Settings
 
@@ -73,6 +74,27 @@ class Picture:
     data: bytes
     header: Mapping[str, object]
     timing_ms: Mapping[str, float]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Rendered:
+    """A frame that is not encoded yet.
+
+    Attributes:
+        frame: the picture and its cost.
+        map_ms: time spent on its map before rendering [ms].
+        started_ns, finished_ns: when rendering began and ended [monotonic ns].
+    """
+
+    frame: Frame
+    map_ms: float
+    started_ns: int
+    finished_ns: int
+
+    def stages(self) -> dict[str, float]:
+        """Time of each stage [ms]."""
+        times = self.frame.cost.time_ms
+        return {"map": times.map + self.map_ms, "trace": times.trace, "reconstruct": times.reconstruct}
 
 
 class Studio:
@@ -186,33 +208,51 @@ class Studio:
             UnknownScene, SceneError: for a scene that is not there or cannot be loaded.
             OverLimit: for more camera rays than one request may ask for.
         """
-        prepared = self.library.load(order.scene_id)
-        started_ns = time.monotonic_ns()
-        known_map, map_ms = self._check_cells(order.request)
-        frame = self._renderer.render(prepared, order.request)
-        rendered_ns = time.monotonic_ns()
-        data = encode(frame.pixels, order.format, order.image_quality)
+        rendered = self.trace(order.scene_id, self.library.load(order.scene_id), order.request)
+        data = encode(rendered.frame.pixels, order.format, order.image_quality)
         finished_ns = time.monotonic_ns()
-        cost = replace(frame.cost, map_cached=frame.cost.map_cached and known_map)
-        if cost.rejected_samples:
-            log.warning("%s: %d samples were not finite and count as black", order.scene_id, cost.rejected_samples)
         timing_ms = {
-            "wait": (started_ns - received_ns) / NS_PER_MS,
-            "map": cost.time_ms.map + map_ms,
-            "trace": cost.time_ms.trace,
-            "reconstruct": cost.time_ms.reconstruct,
-            "encode": (finished_ns - rendered_ns) / NS_PER_MS,
+            "wait": (rendered.started_ns - received_ns) / NS_PER_MS,
+            **rendered.stages(),
+            "encode": (finished_ns - rendered.finished_ns) / NS_PER_MS,
             "total": (finished_ns - received_ns) / NS_PER_MS,
         }
         timing_ms = {stage: round(time_ms, 3) for stage, time_ms in timing_ms.items()}
         header = {
             "frame": next(self._frames),
-            **_shown(order, frame),
-            **_spent(cost),
+            **_shown(order, rendered.frame),
+            **spent(order.request, rendered.frame.cost),
             "timing_ms": timing_ms,
-            "service_time_ns": {"gaze_received": received_ns, "started": started_ns, "finished": finished_ns},
+            "service_time_ns": {
+                "gaze_received": received_ns,
+                "started": rendered.started_ns,
+                "finished": finished_ns,
+            },
         }
         return Picture(data, header, timing_ms)
+
+    def trace(
+        self, scene_id: str, prepared: PreparedScene, request: FrameRequest, abandon: threading.Event | None = None
+    ) -> Rendered:
+        """Render a frame without encoding it.
+
+        Args:
+            scene_id: for the log.
+            prepared: the scene.
+            request: already checked.
+            abandon: set it, from another thread, to give up the frame.
+
+        Raises:
+            Abandoned: soon after `abandon` is set.
+            OverLimit: for more camera rays than one request may ask for.
+        """
+        started_ns = time.monotonic_ns()
+        known_map, map_ms = self._check_cells(request)
+        frame = self._renderer.render(prepared, request, abandon)
+        cost = replace(frame.cost, map_cached=frame.cost.map_cached and known_map)
+        if cost.rejected_samples:
+            log.warning("%s: %d samples were not finite and count as black", scene_id, cost.rejected_samples)
+        return Rendered(replace(frame, cost=cost), map_ms, started_ns, time.monotonic_ns())
 
     def _check_cells(self, request: FrameRequest) -> tuple[bool, float]:
         """Count the cells where the pixels alone do not tell that the rays are few enough.
@@ -254,10 +294,16 @@ def _shown(order: Order, frame: Frame) -> dict[str, object]:
     }
 
 
-def _spent(cost: FrameCost) -> dict[str, object]:
+def spent(request: FrameRequest, cost: FrameCost) -> dict[str, object]:
     """The header's part on what the picture cost."""
     return {
-        "map": {"kind": cost.map, "cells": cost.cells, "bucket_px": cost.bucket_px, "cached": cost.map_cached},
+        "map": {
+            "kind": cost.map,
+            "cells": cost.cells,
+            "bucket_px": cost.bucket_px,
+            "margin_deg": request.quality.acuity.margin_deg,
+            "cached": cost.map_cached,
+        },
         "samples_per_cell": cost.samples_per_cell,
         "samples": round(cost.mean_samples, 3),
         "acuity_scale": cost.acuity_scale,

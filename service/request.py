@@ -149,7 +149,21 @@ class QualityBody(_Body):
         return Quality(acuity=self.acuity.record(), **stated)
 
 
-class RenderBody(_Body):
+class _ViewBody(_Body):
+    scene: SceneId
+    display: DisplayBody = DisplayBody()
+    camera: CameraBody | None = Field(default=None, description="null: the scene's own")
+    quality: QualityBody = QualityBody()
+    format: Format = "png"
+    image_quality: ImageQuality = IMAGE_QUALITY
+
+    def request_at(self, gaze: Gaze, display: Display) -> FrameRequest:
+        """The same for a gaze on the display, which is this one's own."""
+        camera = None if self.camera is None else self.camera.record()
+        return FrameRequest(gaze, display, camera, self.quality.record(), linear=self.format == "raw")
+
+
+class RenderBody(_ViewBody):
     """A frame: only `scene` and `gaze` are required."""
 
     model_config = ConfigDict(
@@ -164,13 +178,7 @@ class RenderBody(_Body):
         }
     )
 
-    scene: SceneId
     gaze: GazeBody
-    display: DisplayBody = DisplayBody()
-    camera: CameraBody | None = Field(default=None, description="null: the scene's own")
-    quality: QualityBody = QualityBody()
-    format: Format = "png"
-    image_quality: ImageQuality = IMAGE_QUALITY
 
     def order(self) -> Order:
         """The same in the renderer's terms.
@@ -179,14 +187,25 @@ class RenderBody(_Body):
             SettingsError: naming the field, for what only the renderer's records can tell.
         """
         display = self.display.record()
-        request = FrameRequest(
-            gaze_on(display, self.gaze.x, self.gaze.y, self.gaze.unit),
-            display,
-            None if self.camera is None else self.camera.record(),
-            self.quality.record(),
-            linear=self.format == "raw",
-        )
-        return Order(self.scene, request, self.format, self.image_quality)
+        gaze = gaze_on(display, self.gaze.x, self.gaze.y, self.gaze.unit)
+        return Order(self.scene, self.request_at(gaze, display), self.format, self.image_quality)
+
+
+class StreamBody(_ViewBody):
+    """What a stream shows: only `scene` is required. `format` is that of all frames but the last, lossless one."""
+
+    gaze: GazeBody | None = None
+    format: Format = "jpeg"
+
+    def order(self) -> Order:
+        """The same in the renderer's terms, for a gaze in the middle of the screen.
+
+        Raises:
+            SettingsError: naming the field, for what only the renderer's records can tell.
+        """
+        display = self.display.record()
+        middle = Gaze(display.width_px / 2, display.height_px / 2)
+        return Order(self.scene, self.request_at(middle, display), self.format, self.image_quality)
 
 
 class NoQuery(BaseModel):

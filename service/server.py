@@ -6,7 +6,7 @@ import socket
 from collections.abc import Callable
 
 import uvicorn
-from starlette.types import ASGIApp
+from fastapi import FastAPI
 
 from renderer.errors import SettingsError
 from service.app import create_app
@@ -14,6 +14,9 @@ from service.settings import Settings
 
 GOODBYE_S = 5
 """How long requests in work may take to end when the service is told to stop [s]."""
+
+PING_S = 20.0
+"""How often a stream's client is asked whether it is still there, and how long it may take to answer [s]."""
 
 BACKLOG = 128
 
@@ -34,20 +37,39 @@ def serve(settings: Settings, announce: Callable[[str], None]) -> None:
         token = ' -H "Authorization: Bearer $GAZETRACE_TOKEN"' if settings.token is not None else ""
         announce(f"a page to look with: {address}/    the API: {address}/docs    a frame:")
         announce(f'curl{token} -o frame.png "{address}/v1/scenes/spheres/frame?gaze_x=0.5&gaze_y=0.5&unit=fraction"')
-        server = uvicorn.Server(server_config(create_app(settings, announce=announce)))
+        server = Server(create_app(settings, announce=announce), settings)
         try:
             server.run(sockets=[listener])
         except KeyboardInterrupt:
             announce("stopped")
 
 
-def server_config(app: ASGIApp) -> uvicorn.Config:
+class Server(uvicorn.Server):
+    """uvicorn, but streams end before it closes connections: with a code that tells clients to come back."""
+
+    def __init__(self, app: FastAPI, settings: Settings) -> None:
+        super().__init__(server_config(app, settings))
+        self._app = app
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """Say goodbye, then stop."""
+        for server in self.servers:
+            server.close()
+        await self._app.state.desk.sessions.stop()
+        await super().shutdown(sockets)
+
+
+def server_config(app: FastAPI, settings: Settings) -> uvicorn.Config:
     """How uvicorn runs an application."""
     return uvicorn.Config(
         app,
         log_config=None,
         access_log=False,
-        ws="none",
+        ws="websockets-sansio",
+        ws_max_size=settings.max_message_bytes,
+        ws_ping_interval=PING_S,
+        ws_ping_timeout=PING_S,
+        ws_per_message_deflate=False,
         lifespan="on",
         proxy_headers=False,
         server_header=False,

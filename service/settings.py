@@ -13,6 +13,7 @@ from urllib.parse import urlsplit
 from renderer.display import MAX_SIDE_PX
 from renderer.errors import SettingsError, require_integer
 from renderer.quality import MAX_DEPTH, MAX_SAMPLES
+from service.protocol import MAX_TEXT_BYTES
 
 VARIABLE_PREFIX = "GAZETRACE_"
 
@@ -24,6 +25,9 @@ MOST_RENDERS = 64
 MOST_QUEUED = 10_000
 MOST_BYTES = 1 << 44
 MOST_CAMERA_RAYS = 10**13
+MOST_SESSIONS = 1024
+LEAST_MESSAGE_BYTES = 1024
+LONGEST_EXPIRY_S = 7 * 24 * 3600
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +48,10 @@ class Settings:
         max_body_bytes: largest request body.
         max_concurrent_renders: frames rendered at once.
         max_queued_renders: frames that may wait for their turn; beyond, a client is told to come back.
+        max_sessions: streaming sessions at once.
+        max_viewers: viewers, and gaze sources, of one session.
+        max_message_bytes: longest message of a stream that is read.
+        session_expiry_s: how long a session is kept for those who left it [s].
         map_cache_bytes: memory for cell maps.
         store_bytes: memory for samples of earlier frames.
         scene_bytes: memory for loaded scenes.
@@ -67,6 +75,10 @@ class Settings:
     max_body_bytes: int = 64 << 10
     max_concurrent_renders: int = 4
     max_queued_renders: int = 16
+    max_sessions: int = 16
+    max_viewers: int = 16
+    max_message_bytes: int = MAX_TEXT_BYTES
+    session_expiry_s: int = 60
     map_cache_bytes: int = 256 << 20
     store_bytes: int = 512 << 20
     scene_bytes: int = 1 << 30
@@ -86,6 +98,10 @@ class Settings:
         require_integer("max_body_bytes", self.max_body_bytes, 1, MOST_BYTES)
         require_integer("max_concurrent_renders", self.max_concurrent_renders, 1, MOST_RENDERS)
         require_integer("max_queued_renders", self.max_queued_renders, 0, MOST_QUEUED)
+        require_integer("max_sessions", self.max_sessions, 1, MOST_SESSIONS)
+        require_integer("max_viewers", self.max_viewers, 1, MOST_SESSIONS)
+        require_integer("max_message_bytes", self.max_message_bytes, LEAST_MESSAGE_BYTES, MAX_TEXT_BYTES)
+        require_integer("session_expiry_s", self.session_expiry_s, 0, LONGEST_EXPIRY_S)
         for name in ("map_cache_bytes", "store_bytes", "scene_bytes"):
             require_integer(name, getattr(self, name), 0, MOST_BYTES)
         if self.scenes is not None and not os.path.isdir(self.scenes):

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import httpx
 import pytest
-import uvicorn
 
 from renderer.pipeline import Renderer
 from service.app import create_app
-from service.server import address_of, listen, server_config
+from service.server import Server, address_of, listen
 from service.settings import Settings
 
 PATIENCE_S = 120
@@ -23,7 +23,13 @@ BROKEN_SCENE = "broken"
 
 
 @contextmanager
-def serving(settings: Settings, renderer: Renderer | None = None, *, ready: bool = True) -> Iterator[str]:
+def serving(
+    settings: Settings,
+    renderer: Renderer | None = None,
+    *,
+    ready: bool = True,
+    clock: Callable[[], int] = time.monotonic_ns,
+) -> Iterator[str]:
     """A service in a thread of this process: its address. `ready`: once it renders, else at once."""
     lines: list[str] = []
     compiled = threading.Event()
@@ -34,7 +40,7 @@ def serving(settings: Settings, renderer: Renderer | None = None, *, ready: bool
             compiled.set()
 
     with listen(settings) as listener:
-        server = uvicorn.Server(server_config(create_app(settings, renderer, announce)))
+        server = Server(create_app(settings, renderer, announce, clock), settings)
         thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]})
         thread.start()
         try:

@@ -128,8 +128,8 @@ DOWN = [
         '"gaze_state":"held"}',
     ),
     (
-        protocol.Error("over-limit", "too many", "quality.max_depth"),
-        '{"type":"error","code":"over-limit","message":"too many","field":"quality.max_depth"}',
+        protocol.Error("over-limit", "too many", "quality.max_depth", 3),
+        '{"type":"error","code":"over-limit","message":"too many","field":"quality.max_depth","id":3}',
     ),
     (protocol.Pong(1, 99, 100), '{"type":"pong","id":1,"client_time_ns":99,"service_time_ns":100}'),
     (

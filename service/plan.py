@@ -1,0 +1,139 @@
+"""What to render for a configuration and a gaze: first a quick frame, then more and more samples."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from renderer.frame import FrameRequest
+from renderer.gaze import Gaze, GazeBucket
+from renderer.prepared import PreparedScene
+from renderer.quality import Quality
+from service.conditioning import Attention, slack_deg, steady_bucket, within
+from service.protocol import FramePhase
+from service.rendering import Order
+from service.request import StreamBody, gaze_on
+
+MOVING_QUALITY_DROP = 15
+"""How much lower the quality of JPEG and WebP is while the gaze moves."""
+
+LOWEST_QUALITY = 30
+
+SACCADE_SCALE = 2.0
+"""Cells are so much wider while the eye is on its way and sees little."""
+
+UNCHANGED_FORMATS = ("png", "raw")
+"""Formats that lose nothing, so that the last frame needs no other."""
+
+EVERYWHERE_DEG = 90.0
+"""Margin of a gaze that may be anywhere on the screen: all cells are as small as at the gaze."""
+
+
+@dataclass(frozen=True, slots=True)
+class Configuration:
+    """What a session shows.
+
+    Attributes:
+        id: the client's number for it.
+        body: as it was asked for.
+        prepared: its scene.
+        order: the same in the renderer's terms; its gaze means nothing.
+    """
+
+    id: int
+    body: StreamBody
+    prepared: PreparedScene
+    order: Order
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """What decides a picture besides its samples: equal looks refine one picture, another look begins anew.
+
+    Attributes:
+        bucket: the gazes it is for; None for the whole screen.
+        margin_deg: error of the gaze to allow for.
+        saccade: True for wider cells, and no refinement.
+    """
+
+    bucket: GazeBucket | None
+    margin_deg: float
+    saccade: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One frame on the way to the best one.
+
+    Attributes:
+        request: what to render.
+        phase: what to call it.
+        format, image_quality: how to encode it.
+        last: whether it shows all samples there will be.
+    """
+
+    request: FrameRequest
+    phase: FramePhase
+    format: str
+    image_quality: int
+    last: bool
+
+
+def gaze_px(configuration: Configuration, attention: Attention) -> Gaze | None:
+    """The newest good gaze on the configuration's display; None where there was none."""
+    sample = attention.sample
+    if sample is None or sample.x is None or sample.y is None:
+        return None
+    return gaze_on(configuration.order.request.display, sample.x, sample.y, sample.unit)
+
+
+def look_at(configuration: Configuration, attention: Attention, margin_deg: float, before: Look | None) -> Look:
+    """What to look at now.
+
+    Args:
+        configuration: in force.
+        attention: of the eye.
+        margin_deg: how far off the trackers say they may be.
+        before: the look so far, with the same configuration; it stays while the gaze stays about its bucket.
+    """
+    quality = configuration.order.request.quality
+    gaze = gaze_px(configuration, attention)
+    if quality.map == "full" or gaze is None or attention.state == "lost":
+        return Look(None, 0.0, saccade=False)
+    side_px = quality.gaze_bucket_px
+    bucket = steady_bucket(before.bucket if before is not None else None, gaze, side_px)
+    display = configuration.order.request.display
+    slack = slack_deg(side_px, max(display.pitch_x_cm, display.pitch_y_cm), display.distance_cm)
+    margin = min(max(quality.acuity.margin_deg, margin_deg) + slack, EVERYWHERE_DEG)
+    return Look(bucket, margin, attention.saccade)
+
+
+def step_of(configuration: Configuration, look: Look, attention: Attention, index: int) -> Step:
+    """The step number `index` of a look, from 0, up to the one that is `last`."""
+    order = configuration.order
+    gaze = gaze_px(configuration, attention)
+    if look.bucket is not None and gaze is not None:
+        gaze = within(look.bucket, gaze)
+    quality = _quality(order.request.quality, look)
+    samples = min(2**index, quality.samples_per_cell)
+    request = replace(order.request, gaze=gaze or order.request.gaze, quality=quality, samples=samples)
+    last = look.saccade or samples == quality.samples_per_cell
+    phase: FramePhase = "moving" if index == 0 else "still"
+    if last and not look.saccade and order.format in UNCHANGED_FORMATS:
+        phase = "final"
+    drop = min(MOVING_QUALITY_DROP, max(0, order.image_quality - LOWEST_QUALITY)) if phase == "moving" else 0
+    return Step(request, phase, order.format, order.image_quality - drop, last)
+
+
+def steps_done(step: Step, mean_samples: float, before: int) -> int:
+    """How many steps are done after one more; all but the last where every sample was there already."""
+    most = step.request.quality.samples_per_cell
+    return max(before + 1, (most - 1).bit_length()) if mean_samples >= most else before + 1
+
+
+def _quality(quality: Quality, look: Look) -> Quality:
+    if quality.map == "full":
+        return quality
+    if look.bucket is None:
+        return replace(quality, map="aligned", acuity=replace(quality.acuity, margin_deg=EVERYWHERE_DEG))
+    scale = quality.acuity.scale * (SACCADE_SCALE if look.saccade else 1.0)
+    return replace(quality, acuity=replace(quality.acuity, margin_deg=look.margin_deg, scale=scale))
