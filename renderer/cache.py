@@ -82,6 +82,12 @@ class ByteCache(Generic[K, V]):
             making.ended.set()
         return value, False
 
+    def peek(self, key: K) -> V | None:
+        """The value of `key` if it is there; this counts as no request and no use."""
+        with self._lock:
+            held = self._values.get(key)
+            return None if held is None else held[0]
+
     def clear(self) -> None:
         """Forget every value."""
         with self._lock:

@@ -202,7 +202,7 @@ def _pixel_angle(pitch: float, reach2: float, distance: float) -> float:
 
 
 @formula
-def _cell_size(eye: EyeGeometry, x: float, y: float) -> float:
+def cell_size(eye: EyeGeometry, x: float, y: float) -> float:
     """alpha / beta of the screen point (x, y) [cm], at least 1, whose floor is the cell size rho
     (Siekawa and Mantiuk 2014, eq. 5).
 
@@ -301,4 +301,4 @@ def fill_cell_sizes(eye: EyeGeometry, first_row: int, sizes: NDArray[np.uint16])
                         y = (first_row + row + 0.5 - eye.height_px / 2) * eye.pitch_y
                         for column in range(left, right):
                             x = (column + 0.5 - eye.width_px / 2) * eye.pitch_x
-                            sizes[row, column] = int(_cell_size(eye, x, y))
+                            sizes[row, column] = int(cell_size(eye, x, y))

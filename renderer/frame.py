@@ -85,7 +85,8 @@ class FrameCost:
         samples_traced: camera samples traced for this frame.
         mean_samples: camera samples that the frame shows, a cell on average.
         acuity_scale: factor on the cells' width that was used.
-        deadline_met: whether the frame was finished in time; None without a deadline.
+        deadline_ms: time that it was given [ms], None for as much as it takes.
+        deadline_met: whether it was finished in time; None without a deadline.
         cells_traced, cells_reused: cells traced for this frame, and taken from the sample store as they were.
         rays: rays traced for this frame.
         effects: names of the effects that the scene calls for and that ran.
@@ -103,6 +104,7 @@ class FrameCost:
     samples_traced: int
     mean_samples: float
     acuity_scale: float
+    deadline_ms: float | None
     deadline_met: bool | None
     cells_traced: int
     cells_reused: int

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from typing import NamedTuple
 
 import numpy as np
@@ -25,6 +26,7 @@ class Growth(NamedTuple):
         rejected: samples that were no light.
         held: samples that all cells of the frame have now.
         fewest: samples that every cell of the frame has at least.
+        trace_ns: time for tracing them [ns].
     """
 
     cells: int
@@ -33,6 +35,7 @@ class Growth(NamedTuple):
     rejected: int
     held: int
     fewest: int
+    trace_ns: int
 
 
 def grow(
@@ -73,9 +76,11 @@ def grow(
         radiance, counts[block] = trace_cells(prepared, view, some, quality)
         rejected[block] = add_samples(samples, slots, some.chosen, some.until, radiance)
 
+    began = time.perf_counter_ns()
     pool.run(trace, len(counts))
+    trace_ns = time.perf_counter_ns() - began
     traced = int((until - first).sum())
-    return Growth(missing, traced, total_rays(counts), sum(rejected), held + traced, max(fewest, wanted))
+    return Growth(missing, traced, total_rays(counts), sum(rejected), held + traced, max(fewest, wanted), trace_ns)
 
 
 def block_starts(samples: NDArray[np.int32], block: int) -> list[int]:

@@ -4,50 +4,27 @@ from __future__ import annotations
 
 import threading
 import time
-from dataclasses import dataclass, field
 
-import numpy as np
-from numpy.typing import NDArray
-
-from renderer.cache import ByteCache
-from renderer.cellmap import CellMap, build_cell_map
+from renderer.cellmap import CellMap
+from renderer.deadline import NS_PER_MS, affordable_samples, fitted
 from renderer.display import Display
 from renderer.eccentricity import eccentricity_deg
 from renderer.frame import Frame, FrameCost, FrameRequest, StageTimes
-from renderer.gaze import Gaze, GazeBucket, bucket_of
+from renderer.gaze import Gaze
 from renderer.growth import grow
+from renderer.memory import Memory
+from renderer.pace import Pace
 from renderer.prepared import PreparedScene, prepare
 from renderer.quality import MAPS, RECONSTRUCTIONS, Quality
 from renderer.reconstruction import reconstruct
 from renderer.smooth import reconstruct_smooth
 from renderer.standard_error import standard_errors
-from renderer.store import SampleStore, slots_needed, slots_of
 from renderer.warmup import every_effect
 from renderer.whitted import view_of
-from renderer.workers import WorkerPool, Workers
+from renderer.workers import WorkerPool
 
 DEFAULT_MAP_CACHE_BYTES = 256 << 20
 DEFAULT_STORE_BYTES = 512 << 20
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class NumberedMap:
-    """A cell map and the store slot of each of its cells.
-
-    Attributes:
-        cells: the map.
-        slots: (n,) int64.
-        identity: stands for the map in other caches, so that they do not keep it in memory.
-    """
-
-    cells: CellMap
-    slots: NDArray[np.int64]
-    identity: object = field(default_factory=object)
-
-    @property
-    def nbytes(self) -> int:
-        """Size in memory."""
-        return self.cells.nbytes + self.slots.nbytes
 
 
 class Renderer:
@@ -63,9 +40,11 @@ class Renderer:
         map_cache_bytes: int = DEFAULT_MAP_CACHE_BYTES,
         store_bytes: int = DEFAULT_STORE_BYTES,
     ) -> None:
-        self.map_cache: ByteCache[object, NumberedMap] = ByteCache(map_cache_bytes, lambda value: value.nbytes)
-        self.store_cache: ByteCache[object, SampleStore] = ByteCache(store_bytes, lambda value: value.nbytes)
+        self._memory = Memory(map_cache_bytes, store_bytes)
+        self.map_cache = self._memory.maps
+        self.store_cache = self._memory.stores
         self._pool = WorkerPool(threads)
+        self._pace = Pace(self._pool.threads)
 
     @property
     def threads(self) -> int:
@@ -86,14 +65,14 @@ class Renderer:
 
     def cell_map(self, display: Display, quality: Quality, gaze: Gaze) -> tuple[CellMap, bool]:
         """The cell map for a gaze, and whether it came from the cache."""
-        numbered, cached = self._map(display, quality, gaze, self._pool)
+        numbered, cached = self._memory.map(display, quality, gaze, self._pool)
         return numbered.cells, cached
 
     def render(self, prepared: PreparedScene, request: FrameRequest, abandon: threading.Event | None = None) -> Frame:
         """Render one frame.
 
         The same request gives the same bytes, on any number of threads and whatever was rendered before; but
-        one of a limited number of `samples` shows what further samples earlier frames have left.
+        one with a deadline or a limited number of `samples` shows what further samples earlier frames have left.
 
         Args:
             prepared: the scene.
@@ -103,17 +82,21 @@ class Renderer:
         Raises:
             Abandoned: within about a block of rays after `abandon` is set. What was traced by then is kept.
         """
-        began = time.perf_counter()
-        quality = request.quality
-        wanted = quality.samples_per_cell if request.samples is None else request.samples
+        began = time.perf_counter_ns()
         pool = self._pool.until(abandon)
-        numbered, cached = self._map(request.display, quality, request.gaze, pool)
+        rates = self._pace.rates(prepared, request)
+        wanted = request.quality.samples_per_cell if request.samples is None else request.samples
+        request = fitted(request, self._memory.works(prepared, request, wanted), rates)
+        quality = request.quality
+        numbered, cached = self._memory.map(request.display, quality, request.gaze, pool)
         cells, slots = numbered.cells, numbered.slots
-        mapped = time.perf_counter()
+        mapped = time.perf_counter_ns()
         view = view_of(prepared, request.camera or prepared.scene.camera, request.display)
-        with self._store(prepared, request, numbered).held(abandon) as samples:
+        with self._memory.store(prepared, request, numbered).held(abandon) as samples:
+            entered = time.perf_counter_ns()
+            wanted = affordable_samples(request, slots, samples, wanted, rates, entered - began)
             growth = grow(prepared, view, cells, slots, samples, quality, wanted, pool)
-            done = time.perf_counter()
+            done = time.perf_counter_ns()
             rebuild = reconstruct_smooth if quality.reconstruction == "smooth" else reconstruct
             pixels = rebuild(cells, slots, samples, prepared.scene.exposure, request.linear, pool)
             rms, foveal_rms = (
@@ -121,7 +104,11 @@ class Renderer:
                 if growth.fewest >= 2
                 else (None, None)
             )
-        finished = time.perf_counter()
+        finished = time.perf_counter_ns()
+        frame_ns = finished - entered - growth.trace_ns
+        self._pace.learn(
+            prepared, request, None if cached else mapped - began, frame_ns, growth.trace_ns, growth.samples
+        )
         cost = FrameCost(
             map=quality.map,
             cells=cells.cells,
@@ -131,7 +118,8 @@ class Renderer:
             samples_traced=growth.samples,
             mean_samples=growth.held / cells.cells,
             acuity_scale=quality.acuity.scale,
-            deadline_met=None,
+            deadline_ms=quality.deadline_ms,
+            deadline_met=None if quality.deadline_ms is None else finished - began <= NS_PER_MS * quality.deadline_ms,
             cells_traced=growth.cells,
             cells_reused=cells.cells - growth.cells,
             rays=growth.rays,
@@ -139,7 +127,7 @@ class Renderer:
             rms_error=rms,
             foveal_rms_error=foveal_rms,
             rejected_samples=growth.rejected,
-            time_ms=StageTimes(1e3 * (mapped - began), 1e3 * (done - mapped), 1e3 * (finished - done)),
+            time_ms=StageTimes(*(ns / NS_PER_MS for ns in (mapped - began, done - mapped, finished - done))),
         )
         return Frame(pixels, cost)
 
@@ -155,29 +143,6 @@ class Renderer:
                 for reconstruction in RECONSTRUCTIONS:
                     quality = Quality(map=kind, samples_per_cell=2, reconstruction=reconstruction)
                     self.render(scene, FrameRequest(Gaze(1e4, 16.0), display, None, quality, linear))
+        self.render(scene, FrameRequest(Gaze(0.0, 0.0), display, None, Quality(deadline_ms=1.0)))
         eccentricity_deg(display, Gaze(0.0, 0.0))
-
-    def _map(self, display: Display, quality: Quality, gaze: Gaze, pool: Workers) -> tuple[NumberedMap, bool]:
-        bucket = GazeBucket(0.0, 0.0, 0) if quality.map == "full" else bucket_of(gaze, quality.gaze_bucket_px)
-        acuity = None if quality.map == "full" else quality.acuity
-
-        def build() -> NumberedMap:
-            cells = build_cell_map(quality.map, display, quality.acuity, bucket, pool)
-            return NumberedMap(cells, slots_of(cells))
-
-        return self.map_cache.get((quality.map, display, acuity, bucket), build)
-
-    def _store(self, prepared: PreparedScene, request: FrameRequest, numbered: NumberedMap) -> SampleStore:
-        """The store of this view and sampling: shared by all aligned and full maps, one a scanline map."""
-        quality = request.quality
-        key = (
-            prepared.identity,
-            request.camera or prepared.scene.camera,
-            request.display,
-            quality.samples_per_cell,
-            quality.antialiasing,
-            quality.shadow_samples,
-            quality.max_depth,
-            numbered.identity if quality.map == "scanline" else None,
-        )
-        return self.store_cache.get(key, lambda: SampleStore(slots_needed(numbered.cells)))[0]
+        self._pace = Pace(self.threads)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from renderer.acuity import Acuity
-from renderer.errors import require_choice, require_integer
+from renderer.errors import require_choice, require_integer, require_number
 
 MAPS = ("aligned", "scanline", "full")
 ANTIALIASING = ("stochastic", "regular")
@@ -13,6 +13,7 @@ RECONSTRUCTIONS = ("nearest", "smooth")
 MAX_SAMPLES = 4096
 MAX_DEPTH = 64
 MAX_BUCKET_PX = 512
+MAX_DEADLINE_MS = 600_000.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +33,9 @@ class Quality:
         acuity: the eye's resolution.
         reconstruction: how cells become pixels: `nearest`, each pixel its cell's colour (the paper's), or
             `smooth`, cells blended into their neighbours.
+        deadline_ms: time for the whole frame, above 0 to 600,000 [ms]: fewer samples are traced and, if one a
+            cell is too many still, cells made coarser, until the frame should be done in time, going by what
+            such frames have taken on this machine. None: as much time as it takes.
 
     Raises:
         SettingsError: naming the field, for a value out of range.
@@ -45,6 +49,7 @@ class Quality:
     shadow_samples: int = 4
     acuity: Acuity = field(default_factory=Acuity)
     reconstruction: str = "nearest"
+    deadline_ms: float | None = None
 
     def __post_init__(self) -> None:
         require_choice("quality.map", self.map, MAPS)
@@ -54,3 +59,5 @@ class Quality:
         require_integer("quality.shadow_samples", self.shadow_samples, 1, MAX_SAMPLES)
         require_integer("quality.max_depth", self.max_depth, 0, MAX_DEPTH)
         require_choice("quality.reconstruction", self.reconstruction, RECONSTRUCTIONS)
+        if self.deadline_ms is not None:
+            require_number("quality.deadline_ms", self.deadline_ms, 0.0, MAX_DEADLINE_MS, open_low=True)

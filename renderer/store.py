@@ -89,7 +89,7 @@ def aligned_sides(width: int, height: int) -> NDArray[np.int32]:
 
 def aligned_slots(width: int, height: int) -> int:
     """Number of aligned squares of all sides on a screen, those cut by its edge included."""
-    return int(_level_starts(width, height)[-1])
+    return int(aligned_levels(width, height)[1][-1])
 
 
 def slots_of(cell_map: CellMap) -> NDArray[np.int64]:
@@ -98,10 +98,10 @@ def slots_of(cell_map: CellMap) -> NDArray[np.int64]:
         return np.arange(cell_map.cells)
     height, width = cell_map.mask.shape
     slots = np.zeros(cell_map.cells, dtype=np.int64)
-    sides = aligned_sides(width, height)
+    sides, starts = aligned_levels(width, height)
     level = np.zeros(int(sides[-1]) + 1, dtype=np.int32)
     level[sides] = np.arange(len(sides))
-    _find_slots(cell_map.x, cell_map.y, cell_map.side, level, _level_starts(width, height), width, slots)
+    _find_slots(cell_map.x, cell_map.y, cell_map.side, level, starts, width, slots)
     return slots
 
 
@@ -113,10 +113,11 @@ def slots_needed(cell_map: CellMap) -> int:
     return aligned_slots(width, height)
 
 
-def _level_starts(width: int, height: int) -> NDArray[np.int64]:
-    sides = aligned_sides(width, height).astype(np.int64)
-    squares = -(-width // sides) * -(-height // sides)
-    return np.concatenate(([0], np.cumsum(squares)))
+def aligned_levels(width: int, height: int) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
+    """Sides of aligned squares, (l,) int32 [px], and the slot of the first square of each, (l + 1,) int64."""
+    sides = aligned_sides(width, height)
+    squares = -(-width // sides.astype(np.int64)) * -(-height // sides)
+    return sides, np.concatenate(([0], np.cumsum(squares)))
 
 
 @kernel
@@ -163,6 +164,29 @@ def missing_cells(
             first[found] = number
             found += 1
     return found, held, int(fewest)
+
+
+def held_by_number(number: NDArray[np.int32], slots: NDArray[np.int64], most: int) -> NDArray[np.float64]:
+    """Cells by the number of samples they hold, (most + 1,) float64; those with more than `most` count as of `most`.
+
+    Args:
+        number: (slots,) int32 samples in each slot; empty if nothing was traced yet.
+        slots: (n,) int64 slot of each cell.
+        most: 1 or more.
+    """
+    held = np.zeros(most + 1)
+    if len(number) == 0:
+        held[0] = len(slots)
+    else:
+        _count_held(number, slots, held)
+    return held
+
+
+@kernel
+def _count_held(number: NDArray[np.int32], slots: NDArray[np.int64], held: NDArray[np.float64]) -> None:
+    most = len(held) - 1
+    for cell in range(len(slots)):
+        held[min(most, number[slots[cell]])] += 1.0
 
 
 @kernel

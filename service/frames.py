@@ -61,11 +61,16 @@ async def frame(scene_id: str, query: Annotated[FrameQuery, Query()], request: R
     """The same as a render request, of the scene's own view, with an ETag.
 
     The same request gives the same bytes as long as the scene is the same, so a client that sends the ETag back as
-    `If-None-Match` gets a 304 without anything being rendered.
+    `If-None-Match` gets a 304 without anything being rendered. A frame with a deadline depends on how fast the
+    service happens to be; it has no ETag and is not to be kept.
     """
     received_ns = time.monotonic_ns()
     order = query.order(scene_id)
     desk.studio.check_order(order)
+    if query.deadline_ms is not None:
+        reply = _reply(await _rendered(order, received_ns, request, desk))
+        reply.headers["Cache-Control"] = "no-store"
+        return reply
     etag = await desk.look_up(request, lambda: desk.studio.etag(order))
     kept = {"ETag": etag, "Cache-Control": REVALIDATE}
     if _is_known(etag, request.headers.get("if-none-match")):

@@ -307,6 +307,8 @@ def spent(request: FrameRequest, cost: FrameCost) -> dict[str, object]:
         "samples_per_cell": cost.samples_per_cell,
         "samples": round(cost.mean_samples, 3),
         "acuity_scale": cost.acuity_scale,
+        "deadline_ms": cost.deadline_ms,
+        "deadline_met": cost.deadline_met,
         "cells_traced": cost.cells_traced,
         "cells_reused": cost.cells_reused,
         "rays": asdict(cost.rays),

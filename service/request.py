@@ -16,7 +16,7 @@ from renderer.camera import MAX_POSITION_M, Camera
 from renderer.display import MAX_LENGTH_CM, MAX_SIDE_PX, Display
 from renderer.frame import FrameRequest
 from renderer.gaze import MAX_GAZE_PX, Gaze
-from renderer.quality import MAX_BUCKET_PX, MAX_DEPTH, MAX_SAMPLES, Quality
+from renderer.quality import MAX_BUCKET_PX, MAX_DEADLINE_MS, MAX_DEPTH, MAX_SAMPLES, Quality
 from service.rendering import Order
 
 DISPLAY = Display()
@@ -48,6 +48,14 @@ Depth = Annotated[int, Field(ge=0, le=MAX_DEPTH, description="mirrors and bounda
 Reconstruction = Annotated[
     Literal["nearest", "smooth"],
     Field(description="how cells become pixels: each its cell's colour, or cells blended into their neighbours"),
+]
+DeadlineMs = Annotated[
+    float,
+    Field(
+        gt=0,
+        le=MAX_DEADLINE_MS,
+        description="time for the frame without encoding [ms]: fewer samples and, if need be, coarser cells",
+    ),
 ]
 AcuityModel = Annotated[
     Literal["peli", "geisler-perry", "guenter"], Field(description="what the eye resolves away from the gaze")
@@ -141,11 +149,11 @@ class QualityBody(_Body):
     max_depth: Depth = QUALITY.max_depth
     acuity: AcuityBody = AcuityBody()
     reconstruction: Reconstruction = "nearest"
-    deadline_ms: None = None
+    deadline_ms: DeadlineMs | None = None
 
     def record(self) -> Quality:
         """The renderer's record."""
-        stated = self.model_dump(exclude={"acuity", "deadline_ms"})
+        stated = self.model_dump(exclude={"acuity"})
         return Quality(acuity=self.acuity.record(), **stated)
 
 
@@ -272,6 +280,7 @@ class FrameQuery(CellQuery):
     antialiasing: Antialiasing = "stochastic"
     max_depth: Depth = QUALITY.max_depth
     reconstruction: Reconstruction = "nearest"
+    deadline_ms: DeadlineMs | None = None
     format: Format = "png"
     image_quality: ImageQuality = IMAGE_QUALITY
 
@@ -282,6 +291,7 @@ class FrameQuery(CellQuery):
             antialiasing=self.antialiasing,
             max_depth=self.max_depth,
             reconstruction=self.reconstruction,
+            deadline_ms=self.deadline_ms,
         )
 
     def order(self, scene_id: str) -> Order:

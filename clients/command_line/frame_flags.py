@@ -32,6 +32,7 @@ FLAG_OF_FIELD = {
     "quality.antialiasing": "--antialiasing",
     "quality.max_depth": "--max-depth",
     "quality.reconstruction": "--reconstruction",
+    "quality.deadline_ms": "--deadline-ms",
     "quality.acuity.model": "--acuity-model",
     "quality.acuity.eccentricity": "--eccentricity",
     "quality.acuity.scale": "--acuity-scale",
@@ -116,6 +117,12 @@ def _add_quality_flags(detail: argparse._ArgumentGroup, samples: int) -> None:
     )
     for flag, kind, value, metavar, text in numbers:
         detail.add_argument(flag, type=kind, default=value, metavar=metavar, help=f"{text} (default {value:g})")
+    detail.add_argument(
+        "--deadline-ms",
+        type=float,
+        metavar="MS",
+        help="time for the frame without encoding: fewer samples and, if need be, coarser cells (default: none)",
+    )
     choices = (
         ("--antialiasing", default.antialiasing, "KIND", "where a cell's samples go", ANTIALIASING),
         ("--reconstruction", default.reconstruction, "KIND", "how cells become pixels", RECONSTRUCTIONS),
@@ -173,6 +180,7 @@ def quality_of(arguments: argparse.Namespace) -> Quality:
         max_depth=arguments.max_depth,
         acuity=acuity,
         reconstruction=arguments.reconstruction,
+        deadline_ms=arguments.deadline_ms,
     )
 
 

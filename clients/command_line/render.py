@@ -215,6 +215,8 @@ def cost_record(frame: Frame, request: FrameRequest, extra_ms: dict[str, float])
         "samples_per_cell": cost.samples_per_cell,
         "samples": round(cost.mean_samples, 3),
         "acuity_scale": cost.acuity_scale,
+        "deadline_ms": cost.deadline_ms,
+        "deadline_met": cost.deadline_met,
         "cells_traced": cost.cells_traced,
         "cells_reused": cost.cells_reused,
         "rays": {
@@ -239,11 +241,15 @@ def cost_text(record: dict[str, Any]) -> str:
         ("frame", f"{record['output']}: {record['width']}x{record['height']} of {record['scene']}, "
                   f"gaze ({gaze['x']:g}, {gaze['y']:g})"),
         ("cells", f"{cells:,} {record['map']['kind']}, {100 * cells / pixels:.1f} % of the {pixels:,} pixels; "
-                  f"{record['samples_per_cell']} samples each"),
+                  f"{record['samples']:g} samples each"),
         ("rays", f"{sum(rays.values()):,}: " + ", ".join(f"{count:,} {kind}" for kind, count in rays.items())),
         ("effects", ", ".join(record["effects"]) or "none: the scene calls for primary rays only"),
         ("time", ", ".join(f"{ms:,.1f} ms {stage}" for stage, ms in record["timing_ms"].items())),
     ]  # fmt: skip
+    if record["deadline_ms"] is not None:
+        met = "met" if record["deadline_met"] else "missed"
+        lines.append(("deadline", f" of {record['deadline_ms']:g} ms {met} with {record['samples_per_cell']} samples "
+                                  f"a cell and an acuity scale of {record['acuity_scale']:g}"))  # fmt: skip
     rms, foveal = record["error"]["rms"], record["error"]["foveal_rms"]
     if rms is not None:
         near = "" if foveal is None else f", {foveal:.5f} within 2.5 deg of the gaze"

@@ -50,7 +50,7 @@ BODIES_AND_RECORDS = [
     (DisplayBody, Display, set()),
     (CameraBody, Camera, set()),
     (AcuityBody, Acuity, set()),
-    (QualityBody, Quality, {"deadline_ms"}),
+    (QualityBody, Quality, set()),
 ]
 
 
@@ -114,6 +114,7 @@ NUMBERS = [
     (QualityBody, Quality, "gaze_bucket_px", int),
     (QualityBody, Quality, "samples_per_cell", int),
     (QualityBody, Quality, "max_depth", int),
+    (QualityBody, Quality, "deadline_ms", float),
     (CameraBody, Camera, "vertical_fov_deg", float),
 ]
 
@@ -121,7 +122,7 @@ NUMBERS = [
 @pytest.mark.parametrize(("body", "record", "field", "kind"), NUMBERS)
 def test_bounds_are_the_records(body: type[BaseModel], record: type, field: str, kind: type) -> None:
     needed = {"position": [0, 0, 5], "look_at": [0, 0, 0]} if body is CameraBody else {}
-    edges = [0, 1e-3, 1, 16, 64, 90, 179, 512, 1000, 4096, 32_768, 1e9]
+    edges = [0, 1e-3, 1, 16, 64, 90, 179, 512, 1000, 4096, 32_768, 6e5, 1e9]
     probes: list[Any] = [-1, "1", None, True, math.nan, math.inf, -math.inf, 10**400]
     for edge in edges:
         probes += [int(edge), int(edge) + 1, int(edge) - 1]
@@ -161,7 +162,7 @@ def test_bounds_are_the_records(body: type[BaseModel], record: type, field: str,
         ("camera.position", [0, 1, 1e16]),
         ("camera.roll_deg", 1),
         ("quality.map", "round"),
-        ("quality.deadline_ms", 20),
+        ("quality.deadline_ms", "20"),
         ("quality.acuity.model", "watson"),
         ("quality.acuity.blur", 1),
         ("format", "gif"),
@@ -219,6 +220,7 @@ def test_a_body_and_a_query_say_the_same() -> None:
                 "samples_per_cell": 9,
                 "antialiasing": "regular",
                 "max_depth": 3,
+                "deadline_ms": 12.5,
                 "acuity": {"model": "guenter", "eccentricity": "paper", "scale": 1.5, "margin_deg": 0.5},
             },
             "format": "raw",
@@ -239,6 +241,7 @@ def test_a_body_and_a_query_say_the_same() -> None:
             "samples_per_cell": "9",
             "antialiasing": "regular",
             "max_depth": "3",
+            "deadline_ms": "12.5",
             "acuity_model": "guenter",
             "eccentricity": "paper",
             "acuity_scale": "1.5",

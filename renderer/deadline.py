@@ -1,0 +1,119 @@
+"""What fits into a deadline: cells as fine as they can be with one sample each, then as many samples as there is
+time for. The choice is a function of rates, counts and the deadline alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.acuity import MAX_SCALE, Acuity
+from renderer.frame import FrameRequest
+from renderer.pace import Rates
+from renderer.quality import Quality
+from renderer.store import Samples, held_by_number
+
+NS_PER_MS = 1_000_000
+
+LADDER = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)
+"""Factors on the acuity scale, finest first; the coarsest leaves about a fiftieth of the cells."""
+
+
+class Work(NamedTuple):
+    """What a frame of one acuity takes.
+
+    Attributes:
+        acuity: of its map.
+        new_map: whether the map has to be built.
+        held: (n + 1,) cells by the number of samples they hold already, those with all they need last.
+    """
+
+    acuity: Acuity
+    new_map: bool
+    held: NDArray[np.float64]
+
+
+def ladder(quality: Quality) -> Iterator[Acuity]:
+    """The acuities that may be chosen, finest first: that of `quality`, and unless its map is full coarser ones."""
+    for factor in LADDER if quality.map != "full" else LADDER[:1]:
+        scale = quality.acuity.scale * factor
+        if factor == 1.0 or scale <= MAX_SCALE:
+            yield replace(quality.acuity, scale=scale)
+
+
+def fitted(request: FrameRequest, works: Iterable[Work], rates: Rates) -> FrameRequest:
+    """`request`, with cells so coarse that a frame of one sample of each should be done by its deadline, if any."""
+    quality = request.quality
+    if quality.deadline_ms is None or quality.map == "full":
+        return request
+    chosen = choose_acuity(works, request.display.pixels, rates, NS_PER_MS * quality.deadline_ms)
+    return replace(request, quality=replace(quality, acuity=chosen.acuity))
+
+
+def affordable_samples(
+    request: FrameRequest, slots: NDArray[np.int64], samples: Samples, wanted: int, rates: Rates, gone_ns: int
+) -> int:
+    """As many of `wanted` samples a cell as should be traced by the deadline, if there is any.
+
+    Args:
+        request: the frame.
+        slots: (n,) int64 slots of its cells.
+        samples: what they hold.
+        wanted: most samples a cell.
+        rates: time for each part.
+        gone_ns: since the frame was begun [ns].
+    """
+    deadline_ms = request.quality.deadline_ms
+    if deadline_ms is None:
+        return wanted
+    held = held_by_number(samples.number, slots, wanted)
+    return choose_samples(held, wanted, request.display.pixels, rates, NS_PER_MS * deadline_ms - gone_ns)
+
+
+def samples_lacking(held: NDArray[np.float64], wanted: int) -> float:
+    """Samples to trace until every cell has `wanted`, (n + 1,) cells by what they hold; n is all they need."""
+    return float((held[:wanted] * (wanted - np.arange(min(wanted, len(held))))).sum())
+
+
+def choose_acuity(works: Iterable[Work], pixels: int, rates: Rates, left_ns: float) -> Work:
+    """The first of `works` whose frame with one sample a cell fits into `left_ns`, else the last.
+
+    Args:
+        works: one or more, finest first; asked for one by one.
+        pixels: of the screen.
+        rates: time for each part.
+        left_ns: time until the deadline [ns].
+    """
+    chosen: Work | None = None
+    for work in works:
+        chosen = work
+        around = (rates.frame_pixel + (rates.map_pixel if work.new_map else 0.0)) * pixels
+        if around + rates.sample * samples_lacking(work.held, 1) <= left_ns:
+            break
+    assert chosen is not None
+    return chosen
+
+
+def choose_samples(held: NDArray[np.float64], most: int, pixels: int, rates: Rates, left_ns: float) -> int:
+    """The most samples a cell, 1 to `most`, whose frame fits into `left_ns`; 1 if none does.
+
+    Args:
+        held: (n + 1,) cells by the number of samples they hold, n is all they need.
+        most: most samples that are wanted.
+        pixels: of the screen.
+        rates: time for each part.
+        left_ns: time until the deadline, the map being there [ns].
+    """
+    budget = left_ns - rates.frame_pixel * pixels
+    low, high = 1, most
+    while low < high:
+        middle = (low + high + 1) // 2
+        if rates.sample * samples_lacking(held, middle) <= budget:
+            low = middle
+        else:
+            high = middle - 1
+    return low

@@ -1,0 +1,110 @@
+"""What is kept between frames: cell maps, and the samples of views."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterator
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.cache import ByteCache
+from renderer.cellmap import CellMap, build_cell_map
+from renderer.deadline import Work, ladder
+from renderer.display import Display
+from renderer.forecast import forecast_held
+from renderer.frame import FrameRequest
+from renderer.gaze import Gaze, GazeBucket, bucket_of
+from renderer.prepared import PreparedScene
+from renderer.quality import Quality
+from renderer.store import SampleStore, held_by_number, slots_needed, slots_of
+from renderer.workers import Workers
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class NumberedMap:
+    """A cell map and the store slot of each of its cells.
+
+    Attributes:
+        cells: the map.
+        slots: (n,) int64.
+        identity: stands for the map in other caches, so that they do not keep it in memory.
+    """
+
+    cells: CellMap
+    slots: NDArray[np.int64]
+    identity: object = field(default_factory=object)
+
+    @property
+    def nbytes(self) -> int:
+        """Size in memory."""
+        return self.cells.nbytes + self.slots.nbytes
+
+
+class Memory:
+    """Cell maps by screen, eye and bucket of gazes; samples by view and sampling. Safe for any number of threads.
+
+    Attributes:
+        maps, stores: the caches, each bounded in bytes.
+    """
+
+    def __init__(self, map_bytes: int, store_bytes: int) -> None:
+        self.maps: ByteCache[Hashable, NumberedMap] = ByteCache(map_bytes, lambda value: value.nbytes)
+        self.stores: ByteCache[Hashable, SampleStore] = ByteCache(store_bytes, lambda value: value.nbytes)
+
+    def map(self, display: Display, quality: Quality, gaze: Gaze, pool: Workers) -> tuple[NumberedMap, bool]:
+        """The map for a gaze, built on `pool` if it is not there, and whether it was there."""
+
+        def build() -> NumberedMap:
+            cells = build_cell_map(quality.map, display, quality.acuity, _bucket(quality, gaze), pool)
+            return NumberedMap(cells, slots_of(cells))
+
+        return self.maps.get(_map_key(display, quality, gaze), build)
+
+    def store(self, prepared: PreparedScene, request: FrameRequest, numbered: NumberedMap) -> SampleStore:
+        """The samples of a view: shared by all its aligned and full maps, but a scanline map has its own."""
+        key = _store_key(prepared, request, numbered)
+        return self.stores.get(key, lambda: SampleStore(slots_needed(numbered.cells)))[0]
+
+    def works(self, prepared: PreparedScene, request: FrameRequest, wanted: int) -> Iterator[Work]:
+        """What the frame takes with each acuity, finest first: maps that are there are counted, others forecast.
+
+        Args:
+            prepared, request: the frame.
+            wanted: samples that each cell is to have at most.
+        """
+        display = request.display
+        for acuity in ladder(request.quality):
+            quality = replace(request.quality, acuity=acuity)
+            numbered = self.maps.peek(_map_key(display, quality, request.gaze))
+            store = self.stores.peek(_store_key(prepared, request, numbered))
+            number = np.zeros(0, dtype=np.int32) if store is None else store.samples.number
+            if numbered is None:
+                bucket = _bucket(quality, request.gaze)
+                yield Work(acuity, True, forecast_held(display, acuity, bucket, number, wanted))
+            else:
+                yield Work(acuity, False, held_by_number(number, numbered.slots, wanted))
+
+
+def _bucket(quality: Quality, gaze: Gaze) -> GazeBucket:
+    return GazeBucket(0.0, 0.0, 0) if quality.map == "full" else bucket_of(gaze, quality.gaze_bucket_px)
+
+
+def _map_key(display: Display, quality: Quality, gaze: Gaze) -> Hashable:
+    """What decides a map."""
+    return quality.map, display, None if quality.map == "full" else quality.acuity, _bucket(quality, gaze)
+
+
+def _store_key(prepared: PreparedScene, request: FrameRequest, numbered: NumberedMap | None) -> Hashable:
+    """What decides samples; no store has the key of a scanline map that is not there."""
+    quality = request.quality
+    return (
+        prepared.identity,
+        request.camera or prepared.scene.camera,
+        request.display,
+        quality.samples_per_cell,
+        quality.antialiasing,
+        quality.shadow_samples,
+        quality.max_depth,
+        None if quality.map != "scanline" else "none" if numbered is None else numbered.identity,
+    )
