@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from typing import Any
 
 from clients.bridge.codec import BadRecord, Line, LineCodec
@@ -27,7 +28,7 @@ class JsonLines(LineCodec):
 
     name = "jsonl"
 
-    def __init__(self, paths: dict[str, str] | None = None) -> None:
+    def __init__(self, paths: Mapping[str, str] | None = None) -> None:
         super().__init__()
         self._paths = {
             field: tuple(path.split(".")) for field, path in (DEFAULT_PATHS if paths is None else paths).items()
