@@ -85,10 +85,10 @@ class Asl(Codec):
             if len(self._pending) == self._record_size:
                 sample = self._read(bytes(self._pending))
                 self._pending.clear()
-                self._asked_ns = None
                 if sample is None:
-                    self.bad += 1
+                    self.bad += 1  # on demand: bytes may be out of step, so the next request waits for silence
                 else:
+                    self._asked_ns = None
                     samples.append(sample)
         return samples
 

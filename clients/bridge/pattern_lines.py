@@ -9,7 +9,7 @@ from clients.bridge.errors import ConfigError
 from clients.bridge.fields import KNOWN_FIELDS, sample_of
 from clients.bridge.sample import Point, Sample
 
-DEFAULT_PATTERN = r"x=(?P<x>\S+) y=(?P<y>\S+)"
+DEFAULT_PATTERN = r"(?P<x>\S+) (?P<y>\S+)"
 
 
 class PatternLines(LineCodec):
@@ -45,4 +45,4 @@ class PatternLines(LineCodec):
     def encode(self, time_ns: int, point: Point | None) -> bytes:  # noqa: ARG002 (a pattern has no inverse)
         """A line for the default pattern."""
         x, y = (f"{point.x:.5f}", f"{point.y:.5f}") if point is not None else ("nan", "nan")
-        return f"x={x} y={y}\n".encode("ascii")
+        return f"{x} {y}\n".encode("ascii")
