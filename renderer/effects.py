@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from renderer.light_reach import reaching_lights
-from renderer.scene import BLACK, Light, Material, Mesh, PointLight, RectangleLight, Scene, SphereLight
+from renderer.scene import BLACK, Light, Material, Mesh, PointLight, RectangleLight, Scene, SphereLight, Texture
 
 EFFECTS = ("textures", "specular", "shadows", "soft_shadows", "reflection", "refraction")
 """All there are: `shadows` are the hard ones of point lights, `soft_shadows` those of lights with a size."""
@@ -54,7 +54,7 @@ def plan_effects(scene: Scene) -> EffectPlan:
     }
     casters = _casters(scene)
     calls: dict[str, Callable[[Material], bool]] = {
-        "textures": lambda material: material.diffuse_texture is not None and material.diffuse != BLACK,
+        "textures": lambda material: bool(textures_of(material)),
         "specular": lambda material: has_highlight(material) and bool(lights),
         "shadows": lambda material: _takes_light(material) and bool(casting["shadows"]) and casters > 0,
         "soft_shadows": lambda material: _takes_light(material) and bool(casting["soft_shadows"]) and casters > 0,
@@ -69,6 +69,16 @@ def plan_effects(scene: Scene) -> EffectPlan:
         elif called_by:
             effects.append(Effect(name, _bearers(called_by, users)))
     return EffectPlan(tuple(effects))
+
+
+def textures_of(material: Material) -> list[Texture]:
+    """The textures of a material that change its colour; one that multiplies black does not."""
+    shown = []
+    if material.diffuse_texture is not None and material.diffuse != BLACK:
+        shown.append(material.diffuse_texture)
+    if material.specular_texture is not None and (material.specular != BLACK or material.reflection != BLACK):
+        shown.append(material.specular_texture)
+    return shown
 
 
 def _material_users(scene: Scene) -> dict[Material, Counter[str]]:

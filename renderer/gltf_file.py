@@ -11,6 +11,7 @@ Source: Khronos glTF 2.0 specification.
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import re
 import struct
@@ -35,6 +36,10 @@ from renderer.placement import placed
 from renderer.scene import MAX_COORDINATE_M, Mesh, Texture
 
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
+
+_REPEAT: Final = 10497
+_WRAPS: Final = {_REPEAT: "repeat", 33071: "clamp", 33648: "mirror"}
+"""OpenGL's numbers for what a texture shows beyond its edges."""
 
 _SUPPORTED: Final = re.compile(
     r"KHR_materials_\w+|KHR_lights_punctual|KHR_texture_transform|KHR_mesh_quantization|EXT_texture_webp"
@@ -93,7 +98,7 @@ class _Reader:
 
     data: GltfData
     max_triangles: int
-    textures: dict[int, Texture] = field(default_factory=dict)
+    textures: dict[tuple[int, str, str], Texture] = field(default_factory=dict)
     materials: dict[int, GltfMaterial] = field(default_factory=dict)
     primitives: dict[int, list[Mesh]] = field(default_factory=dict)
     triangles: int = 0
@@ -200,9 +205,22 @@ class _Reader:
         texture = self.data.entry("textures", info.integer("index", 0, LARGEST_INDEX))
         webp = texture.table("extensions").table("EXT_texture_webp")
         index = (webp if "source" in webp else texture).integer("source", 0, LARGEST_INDEX)
-        if index not in self.textures:
-            self.textures[index] = decode_texture(*self.data.image(index))
-        return self.textures[index]
+        wrap_u, wrap_v = self._wraps(texture)
+        if (index, wrap_u, wrap_v) not in self.textures:
+            plain = decode_texture(*self.data.image(index))
+            self.textures[index, wrap_u, wrap_v] = dataclasses.replace(plain, wrap_u=wrap_u, wrap_v=wrap_v)
+        return self.textures[index, wrap_u, wrap_v]
+
+    def _wraps(self, texture: Fields) -> tuple[str, str]:
+        """What the sampler of a texture shows beyond its edges, across and up."""
+        if "sampler" not in texture:
+            return "repeat", "repeat"
+        sampler = self.data.entry("samplers", texture.integer("sampler", 0, LARGEST_INDEX))
+        stated = [sampler.integer(key, 0, LARGEST_INDEX, _REPEAT) for key in ("wrapS", "wrapT")]
+        for key, code in zip(("wrapS", "wrapT"), stated, strict=True):
+            if code not in _WRAPS:
+                raise sampler.refuse(key, f"one of {', '.join(map(str, _WRAPS))}", code)
+        return _WRAPS[stated[0]], _WRAPS[stated[1]]
 
 
 def _indices(owner: Fields, key: str) -> list[int]:

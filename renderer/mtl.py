@@ -1,8 +1,8 @@
 """Materials of OBJ files (.mtl) as this renderer's materials.
 
-The statements `Kd Ks Ns Ke illum Ni Tf d Tr map_Kd` are honoured, in any case of letters; all others are
-skipped, and so are the options of `map_Kd`. A highlight `Ks` is meant relative to `Kd` under the same
-light, so it becomes specular = Ks/pi.
+The statements `Kd Ks Ns Ke illum Ni Tf d Tr map_Kd map_Ks` are honoured, in any case of letters; all others are
+skipped, and so are the options of maps but for `-clamp on`. A highlight `Ks` is meant relative to `Kd` under the
+same light, so it becomes specular = Ks/pi.
 
 | illum | becomes |
 |---|---|
@@ -15,7 +15,7 @@ light, so it becomes specular = Ks/pi.
 
 With any other illum, d < 1 lets through 1 - d with ior 1. What is let through is taken from the
 diffuse: diffuse = Kd * (1 - transmission). Tr is 1 - d, and gives way to d. Without Kd it is 0.8, or 1
-under a texture. Reflectances above 1 count as 1.
+under a texture; without Ks it is 0, or 1 under a texture. Reflectances above 1 count as 1.
 
 Source: B. Fedosejevs, MTL material format (Lightwave, OBJ), 1995, sections "Material color and
 illumination statements" and "Illumination models".
@@ -23,6 +23,7 @@ illumination statements" and "Illumination models".
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from dataclasses import dataclass, field
 
@@ -34,7 +35,9 @@ from renderer.scene import BLACK, MAX_RADIANCE, MAX_SHININESS, Material, Rgb, Te
 GLASS_IOR = 1.5
 """Index of refraction of glass whose file states none."""
 
-_HONOURED = frozenset({"kd", "ks", "ke", "tf", "ns", "ni", "d", "tr", "illum", "map_kd"})
+_HONOURED = frozenset({"kd", "ks", "ke", "tf", "ns", "ni", "d", "tr", "illum"})
+_MAPS = frozenset({"map_kd", "map_ks"})
+_WHITE: Rgb = (1.0, 1.0, 1.0)
 _MIRRORS = (3, 5, 8)
 _GLASS = (4, 6, 7, 9)
 _SEE_THROUGH = (4, 9)
@@ -51,7 +54,7 @@ class _Statements:
     """One `newmtl` block as read so far; None where the file is silent."""
 
     kd: Rgb | None = None
-    ks: Rgb = BLACK
+    ks: Rgb | None = None
     ke: Rgb = BLACK
     tf: Rgb | None = None
     ns: float = 32.0
@@ -59,7 +62,7 @@ class _Statements:
     d: float | None = None
     tr: float | None = None
     illum: int = 2
-    texture: Texture | None = None
+    maps: dict[str, Texture] = field(default_factory=dict)
 
 
 @dataclass(slots=True)
@@ -70,27 +73,30 @@ class _Reader:
     inner: str
     blocks: dict[str, _Statements] = field(default_factory=dict)
     block: _Statements | None = None
-    textures: dict[str, Texture] = field(default_factory=dict)
+    textures: dict[tuple[str, bool], Texture] = field(default_factory=dict)
 
     def statement(self, words: list[str], line: str, where: str) -> None:
         """Take in one line."""
         key = words[0].lower()
         if key == "newmtl":
             self.block = self.blocks[" ".join(words[1:])] = _Statements()
-        elif key not in _HONOURED:
+        elif key not in _HONOURED | _MAPS:
             return
         elif self.block is None:
             raise SceneError(f"{where}: expected newmtl before any other statement, found {words[0]!r}")
-        elif key == "map_kd":
-            self.block.texture = self._texture(_file_name(line), f"{where}: {words[0]}")
+        elif key in _MAPS:
+            self.block.maps[key] = self._texture(line, f"{where}: {words[0]}")
         else:
             _set(self.block, key, words[1:], f"{where}: {words[0]}")
 
-    def _texture(self, name: str, where: str) -> Texture:
+    def _texture(self, line: str, where: str) -> Texture:
+        name, clamped = _file_name(line)
         data, inner = self.folder.read(name, where, self.inner)
-        if inner not in self.textures:
-            self.textures[inner] = decode_texture(data, self.folder.file_label(inner))
-        return self.textures[inner]
+        if (inner, clamped) not in self.textures:
+            wrap = "clamp" if clamped else "repeat"
+            texture = decode_texture(data, self.folder.file_label(inner))
+            self.textures[inner, clamped] = dataclasses.replace(texture, wrap_u=wrap, wrap_v=wrap)
+        return self.textures[inner, clamped]
 
 
 def read_mtl(folder: Folder, data: bytes, inner: str) -> dict[str, Material]:
@@ -132,24 +138,27 @@ def decode_text(data: bytes) -> str:
 
 
 def _material(name: str, block: _Statements) -> Material:
-    diffuse = _at_most_1(block.kd or ((0.8, 0.8, 0.8) if block.texture is None else (1.0, 1.0, 1.0)))
+    texture, shine = block.maps.get("map_kd"), block.maps.get("map_ks")
+    diffuse = _at_most_1(block.kd or ((0.8, 0.8, 0.8) if texture is None else _WHITE))
+    ks = block.ks or (BLACK if shine is None else _WHITE)
     shiny = block.illum >= 2
-    if block.illum == 0 and block.texture is None:
+    if block.illum == 0 and texture is None:
         er, eg, eb = (min(a + b, MAX_RADIANCE) for a, b in zip(diffuse, block.ke, strict=True))
         return Material(name, diffuse=BLACK, emission=(er, eg, eb))
     transmission = _transmission(block)
     r, g, b = (full * (1.0 - through) for full, through in zip(diffuse, transmission, strict=True))
-    sr, sg, sb = (highlight / math.pi for highlight in block.ks)
+    sr, sg, sb = (highlight / math.pi for highlight in ks)
     return Material(
         name,
         diffuse=(r, g, b),
         specular=(sr, sg, sb) if shiny else BLACK,
         shininess=block.ns,
         emission=block.ke,
-        reflection=_at_most_1(block.ks) if block.illum in _MIRRORS else BLACK,
+        reflection=_at_most_1(ks) if block.illum in _MIRRORS else BLACK,
         transmission=transmission,
         ior=_ior(block),
-        diffuse_texture=block.texture,
+        diffuse_texture=texture,
+        specular_texture=shine,
     )
 
 
@@ -176,14 +185,16 @@ def _at_most_1(value: Rgb) -> Rgb:
     return red, green, blue
 
 
-def _file_name(line: str) -> str:
-    """The file of a `map_Kd` statement, which may hold blanks, without the options before it."""
-    rest = _after_key(line)
+def _file_name(line: str) -> tuple[str, bool]:
+    """The file of a map, which may hold blanks, without the options before it; and whether one is `-clamp on`."""
+    rest, clamped = _after_key(line), False
     while rest.startswith("-"):
         words = rest.split(None, 1)
         option, rest = words[0].lower(), words[1] if len(words) > 1 else ""
         if option not in _OPTION_VALUES and option not in _OPTION_POINTS:
-            return f"{option} {rest}".strip()
+            return f"{option} {rest}".strip(), clamped
+        if option == "-clamp":
+            clamped = rest.lower().startswith("on")
         taken = 0
         while rest and taken < (_OPTION_VALUES.get(option) or 3):
             words = rest.split(None, 1)
@@ -191,7 +202,7 @@ def _file_name(line: str) -> str:
                 break
             rest = words[1] if len(words) > 1 else ""
             taken += 1
-    return rest
+    return rest, clamped
 
 
 def _is_number(word: str) -> bool:
@@ -208,7 +219,7 @@ def _after_key(line: str) -> str:
 
 
 def _set(block: _Statements, key: str, words: list[str], where: str) -> None:
-    """Take in one statement other than newmtl and map_Kd."""
+    """Take in one statement other than newmtl and maps."""
     match key:
         case "kd":
             block.kd = _rgb(words, where)

@@ -16,15 +16,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.area_light import area_light_table
+from renderer.atlas import TextureAtlas, build_atlas
 from renderer.direction import unit
-from renderer.effects import EffectPlan, has_highlight, plan_effects
+from renderer.effects import EffectPlan, has_highlight, plan_effects, textures_of
 from renderer.errors import SceneError
 from renderer.intersection import Intersector
 from renderer.light_reach import reaching_lights
 from renderer.scene import Material, Mesh, PointLight, Scene, Texture
 from renderer.sphere import SphereTree, build_sphere_tree
 from renderer.tangent import TANGENT, mesh_tangents
-from renderer.texture import TextureAtlas, build_atlas
 
 FACET = 32
 """Numbers a triangle takes: 128 bytes."""
@@ -33,6 +33,7 @@ MATERIAL_COLUMN = 24
 SMOOTH_COLUMN = 25
 NORMAL_COLUMN = 26
 REACH_COLUMN = 29
+DENSITY_COLUMN = 30
 
 SPECULAR = 1
 MIRROR = 2
@@ -54,10 +55,11 @@ MATERIAL = np.dtype(
         *_COLOURS,
         *((name, np.float32) for name in ("shininess", "ior", "exponent_u", "exponent_v")),
         ("picture", np.int32),
+        ("specular_picture", np.int32),
         ("calls", np.int32),
     ]
 )
-"""One material as the kernels read it; `picture` is -1 without a texture, `calls` are the bits above."""
+"""One material as the kernels read it; pictures are -1 without a texture, `calls` are the bits above."""
 
 LIGHT = np.dtype([*((name, np.float64) for name in ("x", "y", "z", "red", "green", "blue")), ("casts", np.int64)])
 """One point light in scene units; `casts` is 1 where shadow rays are to be traced."""
@@ -69,7 +71,8 @@ class Surfaces(NamedTuple):
     Attributes:
         facets: (m, FACET) float32, one triangle each, in two cache lines: for each of its three corners
             position, unit normal and texture coordinates; then the row of its material, 1 where the
-            corner normals are not the triangle's own, its own unit normal, and its largest coordinate.
+            corner normals are not the triangle's own, its own unit normal, its largest coordinate, and its
+            texture coordinates per scene unit.
         tangents: (m, TANGENT) float32, see `tangent`; (0, TANGENT) where no material is grained.
         spheres: analytic spheres.
         materials: (k,) MATERIAL, each that something visible has.
@@ -129,7 +132,7 @@ def prepare(scene: Scene) -> PreparedScene:
     plan = plan_effects(scene)
     center, scale = _centre_and_scale(scene)
     materials = _used_materials(scene)
-    textures = list(dict.fromkeys(material.diffuse_texture for material in materials if material.diffuse_texture))
+    atlas, picture = build_atlas(list(dict.fromkeys(itertools.chain(*map(textures_of, materials)))))
     row = {material: index for index, material in enumerate(materials)}
     vertices, faces, facets, tangents, casts = _triangles(scene, row, center, scale)
     spheres = build_sphere_tree(
@@ -144,8 +147,8 @@ def prepare(scene: Scene) -> PreparedScene:
         facets=facets,
         tangents=tangents,
         spheres=spheres,
-        materials=_material_table(materials, textures, plan),
-        textures=build_atlas(textures),
+        materials=_material_table(materials, picture, plan),
+        textures=atlas,
         lights=_light_table([light for light in lights if isinstance(light, PointLight)], plan, center, scale),
         area_lights=area_light_table(area_lights, lights, center, scale, "soft_shadows" in plan.names),
         surroundings=np.array(
@@ -193,7 +196,7 @@ def _used_materials(scene: Scene) -> list[Material]:
     return list(used)
 
 
-def _material_table(materials: list[Material], textures: list[Texture], plan: EffectPlan) -> NDArray[np.void]:
+def _material_table(materials: list[Material], picture: dict[Texture, int], plan: EffectPlan) -> NDArray[np.void]:
     table = np.zeros(len(materials), dtype=MATERIAL)
     for row, material in enumerate(materials):
         for name in ("diffuse", "specular", "emission", "reflection", "transmission"):
@@ -201,7 +204,8 @@ def _material_table(materials: list[Material], textures: list[Texture], plan: Ef
                 table[row][f"{name}_{channel}"] = value
         for name in ("shininess", "ior", "exponent_u", "exponent_v"):
             table[row][name] = getattr(material, name)
-        table[row]["picture"] = textures.index(material.diffuse_texture) if material.diffuse_texture else -1
+        for name, texture in (("picture", material.diffuse_texture), ("specular_picture", material.specular_texture)):
+            table[row][name] = picture.get(texture, -1) if texture else -1
         table[row]["calls"] = (
             (SPECULAR if "specular" in plan.names and has_highlight(material) else 0)
             | (MIRROR if any(material.reflection) else 0)
@@ -291,7 +295,22 @@ def _fill_facets(mesh: Mesh, local: NDArray[np.float32], material: int, facets: 
     facets[:, MATERIAL_COLUMN] = material
     facets[:, NORMAL_COLUMN : NORMAL_COLUMN + 3] = own[:, 0]
     facets[:, REACH_COLUMN] = np.abs(corners[:, :, :3]).max(axis=(1, 2))
+    facets[:, DENSITY_COLUMN] = _densities(corners, edge)
     facets[:, SMOOTH_COLUMN] = np.abs(corners[:, :, 3:6] - own).max(axis=(1, 2)) > FLAT_NORMAL
+
+
+def _densities(corners: NDArray[np.float32], edge: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(m,) texture coordinates per scene unit: the root of the ratio of a triangle's areas; 0 where there is none.
+
+    Args:
+        corners: (m, 3, 8) as in facets.
+        edge: (m, 2, 3) from the first corner to the others.
+    """
+    with np.errstate(all="ignore"):
+        along = corners[:, 1:, 6:8].astype(np.float64) - corners[:, :1, 6:8]
+        flat = np.abs(along[:, 0, 0] * along[:, 1, 1] - along[:, 0, 1] * along[:, 1, 0])
+        density = np.sqrt(flat / np.linalg.norm(np.cross(edge[:, 0], edge[:, 1]), axis=1))
+    return np.where(density <= np.finfo(np.float32).max, density, 0.0)
 
 
 FLAT_NORMAL = 1e-6

@@ -15,12 +15,14 @@ class Rays(NamedTuple):
         origin, direction: (n, 3) float32; directions are of unit length.
         weight: (n, 3) float32 share of what the ray sees that reaches the eye.
         sample: (n,) int32 camera sample of the block it belongs to; rising along the array.
+        pencil: (n, 2) float32 its width at the origin, and what it gains per scene unit; see `footprint`.
     """
 
     origin: NDArray[np.float32]
     direction: NDArray[np.float32]
     weight: NDArray[np.float32]
     sample: NDArray[np.int32]
+    pencil: NDArray[np.float32]
 
 
 class ShadowRays(NamedTuple):
@@ -58,7 +60,8 @@ class Hits(NamedTuple):
 
 def some_rays(rays: Rays, start: int, stop: int) -> Rays:
     """Rays start .. stop - 1, without a copy."""
-    return Rays(rays.origin[start:stop], rays.direction[start:stop], rays.weight[start:stop], rays.sample[start:stop])
+    part = slice(start, stop)
+    return Rays(rays.origin[part], rays.direction[part], rays.weight[part], rays.sample[part], rays.pencil[part])
 
 
 def first_shadow_rays(rays: ShadowRays, count: int) -> ShadowRays:
@@ -75,6 +78,7 @@ def make_rays(capacity: int) -> Rays:
         direction=np.zeros((capacity, 3), dtype=np.float32),
         weight=np.zeros((capacity, 3), dtype=np.float32),
         sample=np.zeros(capacity, dtype=np.int32),
+        pencil=np.zeros((capacity, 2), dtype=np.float32),
     )
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.camera import ViewFrame
+from renderer.footprint import pencil_spread
 from renderer.kernel import formula, kernel
 from renderer.rays import Rays
 
@@ -121,6 +122,8 @@ def camera_rays(
     """
     corner, step_x, step_y = view.corner, view.step_x, view.step_y
     origins, directions, weights, sample_of = rays.origin, rays.direction, rays.weight, rays.sample
+    pencils = rays.pencil
+    pixel = math.sqrt(np.sqrt((step_x * step_x).sum()) * np.sqrt((step_y * step_y).sum()))
     shift_u, shift_v = lattice_shift(1, points), lattice_shift(step, points)
     ray = 0
     for index in range(len(cells)):
@@ -148,4 +151,5 @@ def camera_rays(
                 origins[ray, axis] = origin[axis]
                 weights[ray, axis] = 1.0
             sample_of[ray] = ray
+            pencils[ray, 0], pencils[ray, 1] = 0.0, pencil_spread(side[cell], points, pixel, length)
             ray += 1

@@ -35,23 +35,33 @@ MAX_RADIANCE = 1e12
 RIGHT_ANGLE = 1e-4
 """Largest cosine between the edges of a rectangle: what coordinates of five digits round to."""
 
+WRAPS = ("repeat", "clamp", "mirror")
+"""What a texture shows beyond its edges: itself again, its edge, itself mirrored."""
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Texture:
-    """An image looked up by texture coordinates, repeating, bilinearly filtered.
+    """An image looked up by texture coordinates, filtered bilinearly, and between smaller copies where it is
+    seen small.
 
     Attributes:
         pixels: (h, w, 3) uint8, sRGB-coded, row 0 at the top; v = 0 is the bottom edge.
         name: for messages.
+        wrap_u, wrap_v: `repeat`, `clamp` or `mirror`, across and up.
 
     Raises:
         SceneError: for another shape or dtype, or no pixels.
+        SettingsError: for an unknown wrap.
     """
 
     pixels: NDArray[np.uint8]
     name: str = "texture"
+    wrap_u: str = "repeat"
+    wrap_v: str = "repeat"
 
     def __post_init__(self) -> None:
+        require_choice(f"{self.name}: wrap_u", self.wrap_u, WRAPS)
+        require_choice(f"{self.name}: wrap_v", self.wrap_v, WRAPS)
         if self.pixels.dtype != np.uint8 or self.pixels.ndim != 3 or self.pixels.shape[2] != 3 or self.pixels.size == 0:
             raise SceneError(
                 f"{self.name}: expected (height, width, 3) uint8 pixels, found {self.pixels.shape} {self.pixels.dtype}"
@@ -79,6 +89,7 @@ class Material:
             whose mirrored share is Fresnel's F and whose transmitted share is (1 - F) * transmission.
         ior: index of refraction inside the surface relative to outside, 0.1 to 10; 1 goes straight through.
         diffuse_texture: multiplies `diffuse`; None for none.
+        specular_texture: multiplies `specular` and `reflection`; None for none.
         base: `phong` or `ashikhmin-shirley`.
         exponent_u, exponent_v: exponents of the highlight of `ashikhmin-shirley` along and across the grain,
             0 to 1e9; the grain runs along the texture coordinate u, round a sphere along its parallels. The
@@ -101,6 +112,7 @@ class Material:
     base: str = "phong"
     exponent_u: float = 100.0
     exponent_v: float = 100.0
+    specular_texture: Texture | None = None
 
     def __post_init__(self) -> None:
         where = f"material {self.name!r}"

@@ -41,6 +41,8 @@ exponent_v = 20.0                  # or 100: across it; a small exponent is a lo
 [materials.wood]
 diffuse = [1.0, 1.0, 1.0]          # or 1 under a texture
 diffuse_texture = "wood.png"
+specular = [0.5, 0.5, 0.5]
+specular_texture = { file = "worn.png", wrap_u = "mirror", wrap_v = "clamp" }  # or repeat
 
 [materials.glass]
 diffuse = [0.0, 0.0, 0.0]
@@ -115,6 +117,7 @@ from renderer.scene import (
     MAX_COORDINATE_M,
     MAX_RADIANCE,
     MAX_SHININESS,
+    WRAPS,
     Light,
     Material,
     Mesh,
@@ -169,7 +172,7 @@ class _Reader:
     folder: Folder
     max_triangles: int
     materials: dict[str, Material] = field(default_factory=dict)
-    textures: dict[str, Texture] = field(default_factory=dict)
+    textures: dict[tuple[str, str, str], Texture] = field(default_factory=dict)
     files: dict[str, Model] = field(default_factory=dict)
     triangles: int = 0
     cameras: list[Camera] = field(default_factory=list)
@@ -207,7 +210,7 @@ class _Reader:
         return Scene(tuple(meshes), tuple(spheres), lights, surroundings, camera, exposure, title, camera_path)
 
     def _material(self, fields: Fields, name: str) -> Material:
-        texture = self._texture(fields) if "diffuse_texture" in fields else None
+        texture, shine = (self._texture(fields, key) for key in ("diffuse_texture", "specular_texture"))
         base = fields.choice("base", BASES, _DEFAULTS.base)
         brightest = MAX_RADIANCE if base == "phong" else 1.0
         material = Material(
@@ -220,6 +223,7 @@ class _Reader:
             transmission=fields.rgb("transmission", 1.0, _DEFAULTS.transmission),
             ior=fields.number("ior", 0.1, 10.0, _DEFAULTS.ior),
             diffuse_texture=texture,
+            specular_texture=shine,
             base=base,
             exponent_u=fields.number("exponent_u", 0.0, MAX_SHININESS, _DEFAULTS.exponent_u),
             exponent_v=fields.number("exponent_v", 0.0, MAX_SHININESS, _DEFAULTS.exponent_v),
@@ -227,12 +231,21 @@ class _Reader:
         fields.refuse_unknown()
         return material
 
-    def _texture(self, fields: Fields) -> Texture:
-        where = f"{fields.file}: {fields.where('diffuse_texture')}"
-        data, inner = self.folder.read(fields.text("diffuse_texture"), where)
-        if inner not in self.textures:
-            self.textures[inner] = decode_texture(data, self.folder.file_label(inner))
-        return self.textures[inner]
+    def _texture(self, fields: Fields, key: str) -> Texture | None:
+        """The texture that a field names, alone or in a table with how it goes on beyond its edges."""
+        if key not in fields:
+            return None
+        if isinstance(fields.value(key), dict):
+            table, file = fields.table(key), "file"
+        else:
+            table, file = Fields({key: fields.value(key)}, fields.file, fields.place), key
+        data, inner = self.folder.read(table.text(file), f"{table.file}: {table.where(file)}")
+        wrap_u, wrap_v = (table.choice(side, WRAPS, "repeat") for side in ("wrap_u", "wrap_v"))
+        table.refuse_unknown()
+        if (inner, wrap_u, wrap_v) not in self.textures:
+            plain = decode_texture(data, self.folder.file_label(inner))
+            self.textures[inner, wrap_u, wrap_v] = dataclasses.replace(plain, wrap_u=wrap_u, wrap_v=wrap_v)
+        return self.textures[inner, wrap_u, wrap_v]
 
     def _meshes(self, fields: Fields) -> list[Mesh]:
         """The meshes of one [[mesh]] table, in their place."""

@@ -8,16 +8,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.finish import Finish
+from renderer.footprint import covered_area, mirrored_spread, refracted_spread
 from renderer.fresnel import fresnel, refracted_cosine
 from renderer.grain import sphere_tangent, triangle_tangent
 from renderer.kernel import formula, kernel, prefetch
 from renderer.light_samples import LightSamples
 from renderer.lighting import light_from_areas, light_from_points
-from renderer.prepared import BOUNDARY, GRAINED, LIT, MIRROR, Surfaces
+from renderer.prepared import BOUNDARY, DENSITY_COLUMN, GRAINED, LIT, MIRROR, Surfaces
 from renderer.rays import Hits, Rays, ShadowRays
 from renderer.reflectance import even_light
 from renderer.surface import Surface, sphere_surface, triangle_surface
-from renderer.texture import look_up
+from renderer.texture import filtered
+
+SPHERE_DENSITY = 0.5 / math.sqrt(math.pi)
+"""Texture coordinates per radius of a sphere, whose whole area one picture covers: the mean over all places."""
 
 AHEAD = 12
 """How many rays ahead a triangle is fetched from memory: its latency over the time of one ray."""
@@ -90,7 +94,8 @@ def shade(
     lights, area_lights = surfaces.lights, surfaces.area_lights
     texels, pictures, linear = surfaces.textures.texels, surfaces.textures.pictures, surfaces.textures.linear
     origin, direction, weight, sample_of = rays.origin, rays.direction, rays.weight, rays.sample
-    primitive_of, hit_u, hit_v = hits.primitive, hits.u, hits.v
+    pencil, child_pencil = rays.pencil, children.pencil
+    primitive_of, distance, hit_u, hit_v = hits.primitive, hits.distance, hits.u, hits.v
     child_origin, child_direction = children.origin, children.direction
     child_weight, child_sample = children.weight, children.sample
     triangles = len(facets)
@@ -129,21 +134,30 @@ def shade(
             )  # fmt: skip
         material = materials[s.material]
         kr, kg, kb = float(material.diffuse_red), float(material.diffuse_green), float(material.diffuse_blue)
-        if material.picture >= 0:
-            picture = pictures[material.picture]
-            tr, tg, tb = look_up(texels, linear, picture.start, picture.width, picture.height, s.u, s.v)
-            kr, kg, kb = kr * tr, kg * tg, kb * tb
+        sr, sg, sb = float(material.specular_red), float(material.specular_green), float(material.specular_blue)
+        mr, mg, mb = float(material.reflection_red), float(material.reflection_green), float(material.reflection_blue)
+        width = np.float64(pencil[ray, 0]) + np.float64(pencil[ray, 1]) * np.float64(distance[ray])
+        if material.picture >= 0 or material.specular_picture >= 0:
+            density = (
+                np.float64(facets[primitive, DENSITY_COLUMN])
+                if primitive < triangles
+                else SPHERE_DENSITY / radius[primitive - triangles]
+            )
+            area = covered_area(s, width, density, dx, dy, dz)
+            if material.picture >= 0:
+                tr, tg, tb = filtered(texels, linear, pictures, material.picture, area, s.u, s.v)
+                kr, kg, kb = kr * tr, kg * tg, kb * tb
+            if material.specular_picture >= 0:
+                tr, tg, tb = filtered(texels, linear, pictures, material.specular_picture, area, s.u, s.v)
+                sr, sg, sb = sr * tr, sg * tg, sb * tb
+                mr, mg, mb = mr * tr, mg * tg, mb * tb
         ux, uy, uz = 0.0, 0.0, 0.0
         if material.calls & GRAINED != 0:
             if primitive < triangles:
                 ux, uy, uz = triangle_tangent(tangents, primitive, np.float64(hit_u[ray]), np.float64(hit_v[ray]), s)
             else:
                 ux, uy, uz = sphere_tangent(s)
-        finish = Finish(
-            kr, kg, kb,
-            float(material.specular_red), float(material.specular_green), float(material.specular_blue),
-            ux, uy, uz,
-        )  # fmt: skip
+        finish = Finish(kr, kg, kb, sr, sg, sb, ux, uy, uz)
         ar, ag, ab = even_light(s, material, finish, dx, dy, dz)
         radiance[sample, 0] += wr * (material.emission_red + ar * around[2, 0])
         radiance[sample, 1] += wg * (material.emission_green + ag * around[2, 1])
@@ -157,7 +171,10 @@ def shade(
             )
         if not spawn or material.calls & (MIRROR | BOUNDARY) == 0:
             continue
-        mr, mg, mb = float(material.reflection_red), float(material.reflection_green), float(material.reflection_blue)
+        curvature = 0.0
+        if primitive >= triangles:
+            curvature = (1.0 if s.entering else -1.0) / radius[primitive - triangles]
+        spread = np.float64(pencil[ray, 1])
         if material.calls & BOUNDARY != 0:
             eta = 1.0 / material.ior if s.entering else np.float64(material.ior)
             cosine = -(dx * s.nx + dy * s.ny + dz * s.nz)
@@ -180,6 +197,8 @@ def shade(
                 )
                 child_weight[n_children, 0], child_weight[n_children, 1], child_weight[n_children, 2] = tr, tg, tb
                 child_sample[n_children] = sample
+                child_pencil[n_children, 0] = width
+                child_pencil[n_children, 1] = refracted_spread(spread, width, curvature, eta)
                 n_children += 1
                 counters[REFRACTIONS] += 1
         mr, mg, mb = wr * mr, wg * mg, wb * mb
@@ -193,6 +212,8 @@ def shade(
             child_direction[n_children, 2] = rz
             child_weight[n_children, 0], child_weight[n_children, 1], child_weight[n_children, 2] = mr, mg, mb
             child_sample[n_children] = sample
+            child_pencil[n_children, 0] = width
+            child_pencil[n_children, 1] = mirrored_spread(spread, width, curvature)
             n_children += 1
             counters[REFLECTIONS] += 1
     counters[CHILDREN] = n_children

@@ -1,56 +1,25 @@
-"""Textures: all pictures of a scene in one array, looked up bilinearly in linear light."""
+"""Textures: looked up bilinearly in linear light, between two sizes of the picture where it is seen small."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import math
 
 import numpy as np
 from numpy.typing import NDArray
 
 from renderer.kernel import formula
-from renderer.scene import Texture
 
-PICTURE = np.dtype([("start", np.int64), ("width", np.int64), ("height", np.int64)])
-"""One picture of an atlas: its first texel and its size."""
+REPEAT, CLAMP, MIRROR = 0, 1, 2
+"""Rows of `renderer.scene.WRAPS`."""
 
-
-class TextureAtlas(NamedTuple):
-    """Pictures one after another.
-
-    Attributes:
-        texels: (n,) uint32 sRGB codes, red | green << 8 | blue << 16, row by row, row 0 of each picture
-            at the top.
-        pictures: (k,) PICTURE.
-        linear: (256,) float64 linear light of each code (IEC 61966-2-1).
-    """
-
-    texels: NDArray[np.uint32]
-    pictures: NDArray[np.void]
-    linear: NDArray[np.float64]
+SHARPNESS = 0.5
+"""By how many levels a picture is taken larger than its texels fill the footprint: the bilinear filter blurs by
+about as much. Least error against the mean over the cell for noise and checks."""
 
 
 def srgb_to_linear(coded: NDArray[np.float64]) -> NDArray[np.float64]:
     """Linear light, 0..1, of sRGB-coded values, 0..1, any shape (IEC 61966-2-1)."""
     return np.where(coded <= 0.04045, coded / 12.92, ((coded + 0.055) / 1.055) ** 2.4)
-
-
-def build_atlas(textures: list[Texture]) -> TextureAtlas:
-    """Lay `textures` one after another; k may be 0."""
-    pictures = np.zeros(len(textures), dtype=PICTURE)
-    start = 0
-    for row, texture in enumerate(textures):
-        height, width = texture.pixels.shape[:2]
-        pictures[row] = (start, width, height)
-        start += width * height
-    texels = [
-        texture.pixels.reshape(-1, 3).astype(np.uint32) @ np.array([1, 1 << 8, 1 << 16], dtype=np.uint32)
-        for texture in textures
-    ]
-    return TextureAtlas(
-        texels=np.concatenate(texels) if texels else np.zeros(1, dtype=np.uint32),
-        pictures=pictures,
-        linear=srgb_to_linear(np.arange(256) / 255),
-    )
 
 
 @formula
@@ -66,25 +35,63 @@ def wrap(coordinate: float) -> float:
 
 
 @formula
-def look_up(
-    texels: NDArray[np.uint32], linear: NDArray[np.float64], start: int, width: int, height: int, u: float, v: float
-) -> tuple[float, float, float]:
-    """Bilinear linear-light colour at (u, v) of a picture that repeats; texel centres at half-integers, v up.
+def within(coordinate: float, mode: int) -> float:
+    """Where in a picture, 0 to 1, a texture coordinate lies; 0 for one that is not a number.
 
     Args:
-        texels, linear: of the atlas.
-        start, width, height: of the picture.
+        coordinate: any.
+        mode: REPEAT, CLAMP or MIRROR, which runs every second repeat backwards.
     """
-    x = wrap(u) * width - 0.5
-    y = (1.0 - wrap(v)) * height - 0.5
-    floor_x, floor_y = np.floor(x), np.floor(y)
-    fx, fy = x - floor_x, y - floor_y
-    left = int(floor_x) if floor_x >= 0.0 else width - 1
-    top = int(floor_y) if floor_y >= 0.0 else height - 1
-    top = 0 if top >= height else top
-    right = left + 1 if left + 1 < width else 0
-    bottom = top + 1 if top + 1 < height else 0
-    upper, lower = start + top * width, start + bottom * width
+    if mode == REPEAT:
+        return wrap(coordinate)
+    if mode == CLAMP:
+        return min(1.0, coordinate) if coordinate > 0.0 else 0.0
+    part = 2.0 * wrap(0.5 * coordinate)
+    return 2.0 - part if part > 1.0 else part
+
+
+@formula
+def neighbours(position: float, length: int, mode: int) -> tuple[int, int, float]:
+    """The two texels around a position along one axis, and the share of the second.
+
+    Args:
+        position: in texels, 0 to `length`.
+        length: of the picture.
+        mode: REPEAT, CLAMP or MIRROR.
+    """
+    floor = np.floor(position - 0.5)
+    share = position - 0.5 - floor
+    first = int(floor)
+    second = first + 1
+    if first < 0:
+        first = length - 1 if mode == REPEAT else 0
+    elif first >= length:
+        first = 0 if mode == REPEAT else length - 1
+    if second >= length:
+        second = 0 if mode == REPEAT else length - 1
+    return first, second, share
+
+
+@formula
+def look_up(
+    texels: NDArray[np.uint32],
+    linear: NDArray[np.float64],
+    pictures: NDArray[np.void],
+    row: int,
+    u: float,
+    v: float,
+) -> tuple[float, float, float]:
+    """Bilinear linear-light colour at (u, v) of one level of a picture; texel centres at half-integers, v up.
+
+    Args:
+        texels, linear, pictures: of the atlas.
+        row: of the level among `pictures`.
+    """
+    picture = pictures[row]
+    width, height = picture.width, picture.height
+    left, right, fx = neighbours(within(u, picture.wrap_u) * width, width, picture.wrap_u)
+    top, bottom, fy = neighbours((1.0 - within(v, picture.wrap_v)) * height, height, picture.wrap_v)
+    upper, lower = picture.start + top * width, picture.start + bottom * width
     a, b = texels[upper + left], texels[upper + right]
     c, d = texels[lower + left], texels[lower + right]
     wa, wb, wc, wd = (1 - fx) * (1 - fy), fx * (1 - fy), (1 - fx) * fy, fx * fy
@@ -94,3 +101,48 @@ def look_up(
     a, b, c, d = a >> 8, b >> 8, c >> 8, d >> 8
     blue = wa * linear[a & 255] + wb * linear[b & 255] + wc * linear[c & 255] + wd * linear[d & 255]
     return red, green, blue
+
+
+@formula
+def level_of(area: float, texels: float) -> float:
+    """Level of a picture whose texels are about as large as a footprint; 0 or less where they are larger.
+
+    Args:
+        area: of the footprint in texture coordinates; NaN counts as 0.
+        texels: of the picture's largest level.
+    """
+    covered = area * texels
+    if not covered > 1.0:
+        return 0.0
+    return 0.5 * math.log2(covered) - SHARPNESS
+
+
+@formula
+def filtered(
+    texels: NDArray[np.uint32],
+    linear: NDArray[np.float64],
+    pictures: NDArray[np.void],
+    row: int,
+    area: float,
+    u: float,
+    v: float,
+) -> tuple[float, float, float]:
+    """Colour at (u, v) of a picture as it is seen by a footprint: between the two levels next to its size.
+
+    Args:
+        texels, linear, pictures: of the atlas.
+        row: of the picture's largest level.
+        area: of the footprint in texture coordinates.
+    """
+    picture = pictures[row]
+    level = level_of(area, picture.texels)
+    if not level > 0.0:
+        return look_up(texels, linear, pictures, row, u, v)
+    last = picture.levels - 1
+    if level >= last:
+        return look_up(texels, linear, pictures, row + last, u, v)
+    whole = int(level)
+    share = level - whole
+    red, green, blue = look_up(texels, linear, pictures, row + whole, u, v)
+    r, g, b = look_up(texels, linear, pictures, row + whole + 1, u, v)
+    return red + share * (r - red), green + share * (g - green), blue + share * (b - blue)

@@ -53,6 +53,8 @@ def test_a_matte_scene_traces_primary_rays_only(renderer: Renderer) -> None:
         (Scene(meshes=(floor(METAL, casts_shadows=False),), lights=LIGHTS), ("specular",), set()),
         (Scene(meshes=(floor(METAL),)), (), set()),
         (Scene(meshes=(floor(Material(diffuse_texture=CHECKS)),)), ("textures",), set()),
+        (Scene(meshes=(floor(Material(reflection=(0.5,) * 3, specular_texture=CHECKS)),)), ("textures", "reflection"),
+         {"reflection"}),
         (Scene(spheres=(ball(lamp()),), lights=LIGHTS), (), set()),
         (Scene(), (), set()),
     ],
@@ -76,6 +78,7 @@ def test_an_effect_runs_where_something_calls_for_it(
         Scene(meshes=(GHOST_FLOOR,), lights=LIGHTS, spheres=(ball(WHITE_LAMBERT, casts_shadows=False),)),
         Scene(meshes=(floor(WHITE_LAMBERT),), lights=(light(0, 4, 0, 50.0, casts_shadows=False),)),
         Scene(meshes=(floor(Material(diffuse=BLACK, diffuse_texture=CHECKS)),)),
+        Scene(meshes=(floor(Material(specular_texture=CHECKS)),)),
         Scene(meshes=(GHOST_FLOOR,), spheres=(ball(Material(reflection=BLACK, transmission=BLACK, ior=2.0)),)),
     ],
     ids=[
@@ -85,6 +88,7 @@ def test_an_effect_runs_where_something_calls_for_it(
         "casters that cast no shadow",
         "a light that casts no shadow",
         "a texture times black",
+        "a specular texture without a highlight",
         "an index without transmission",
     ],
 )

@@ -181,6 +181,22 @@ def test_gltf_highlight_of_a_rough_dielectric_sends_back_its_share(tmp_path: Pat
     np.testing.assert_allclose(np.array(found.specular) * lobe, 0.04, rtol=1e-4)
 
 
+def test_gltf_samplers_say_how_a_texture_goes_on(tmp_path: Path) -> None:
+    (tmp_path / "a.png").write_bytes(png((255, 255, 255), (0, 0, 0)))
+    found = []
+    for sampler in ({}, {"wrapS": 33071, "wrapT": 33648}, {"wrapS": 10497, "wrapT": 33071}):
+        (mesh,) = load_gltf(
+            tmp_path,
+            images=[{"uri": "a.png"}],
+            samplers=[sampler],
+            textures=[{"source": 0, "sampler": 0}],
+            materials=[{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}],
+        )
+        assert mesh.material.diffuse_texture is not None
+        found.append((mesh.material.diffuse_texture.wrap_u, mesh.material.diffuse_texture.wrap_v))
+    assert found == [("repeat", "repeat"), ("clamp", "mirror"), ("repeat", "clamp")]
+
+
 def test_gltf_textures_from_files_and_buffers(tmp_path: Path) -> None:
     picture = png((255, 255, 255), (0, 0, 0))
     (tmp_path / "wood grain.png").write_bytes(picture)

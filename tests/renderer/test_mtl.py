@@ -131,6 +131,17 @@ def test_textures_are_found_beside_the_mtl_and_shared(tmp_path: Path) -> None:
     assert second.material.diffuse == (0.5, 0.5, 0.5)
 
 
+def test_maps_of_highlights_and_maps_that_are_clamped(tmp_path: Path) -> None:
+    (tmp_path / "a.png").write_bytes(png((10, 20, 30)))
+    shiny = material(tmp_path, "illum 3\nmap_Ks -clamp on a.png\nmap_Kd a.png")
+    assert shiny.specular_texture is not None
+    assert shiny.diffuse_texture is not None
+    assert (shiny.specular_texture.wrap_u, shiny.specular_texture.wrap_v) == ("clamp", "clamp")
+    assert shiny.diffuse_texture.wrap_u == "repeat"
+    assert shiny.reflection == (1.0, 1.0, 1.0)
+    assert material(tmp_path, "Ks 0.5 0.5 0.5\nmap_Ks a.png").specular == pytest.approx((0.5 / math.pi,) * 3)
+
+
 def test_links_out_of_the_folder_are_not_followed(tmp_path: Path) -> None:
     (tmp_path / "secret.png").write_bytes(png((1, 2, 3)))
     inside = tmp_path / "model"

@@ -42,7 +42,8 @@ def folder(tmp_path: Path) -> Path:
     (place / "vase.mtl").write_text("newmtl Body\nKd 0.1 0.2 0.3\nnewmtl Lid\nKd 0.4 0.5 0.6\n")
     picture = io.BytesIO()
     Image.new("RGB", (2, 2), (10, 20, 30)).save(picture, "png")
-    (place / "wood.png").write_bytes(picture.getvalue())
+    for name in ("wood.png", "worn.png"):
+        (place / name).write_bytes(picture.getvalue())
     return place
 
 
@@ -104,7 +105,7 @@ def test_the_worked_example_shows_every_field(folder: Path) -> None:
     fields = set().union(*stated["materials"].values())
     assert fields | {"emission"} == {
         "diffuse", "specular", "shininess", "emission", "reflection", "transmission", "ior", "diffuse_texture",
-        "base", "exponent_u", "exponent_v",
+        "base", "exponent_u", "exponent_v", "specular_texture",
     }  # fmt: skip
 
 
@@ -126,6 +127,15 @@ def test_mirrored_meshes_still_face_outwards(folder: Path, scale: str) -> None:
         a, b, c = (mesh.vertices[mesh.faces[:, i]] for i in range(3))
         volume += float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6
     assert volume > 0
+
+
+def test_textures_and_how_they_go_on(folder: Path) -> None:
+    scene = load(folder, worked_example().replace('material = "glass"', 'material = "wood"'))
+    wood = scene.spheres[0].material
+    assert wood.diffuse_texture is not None
+    assert wood.specular_texture is not None
+    assert (wood.diffuse_texture.wrap_u, wood.diffuse_texture.wrap_v) == ("repeat", "repeat")
+    assert (wood.specular_texture.wrap_u, wood.specular_texture.wrap_v) == ("mirror", "clamp")
 
 
 def test_a_material_of_the_other_base(folder: Path) -> None:
@@ -238,6 +248,18 @@ RECTANGLE = "[[light]]\nkind = 'rectangle'\ncorner = [0, 0, 0]\nradiance = [1, 1
         (
             "[materials.red]\ndiffuse_texture = 'none.png'",
             "vase/scene.toml: materials.red.diffuse_texture: expected an existing file, found no file 'none.png'",
+        ),
+        (
+            "[materials.red]\nspecular_texture = { file = 'wood.png', wrap_u = 'tile' }",
+            "vase/scene.toml: materials.red.specular_texture.wrap_u: expected one of repeat, clamp, mirror, found",
+        ),
+        (
+            "[materials.red]\nspecular_texture = { file = 'wood.png', wrap = 'clamp' }",
+            "vase/scene.toml: materials.red.specular_texture.wrap: expected one of the fields file, wrap_u, wrap_v",
+        ),
+        (
+            "[materials.red]\ndiffuse_texture = 7",
+            "vase/scene.toml: materials.red.diffuse_texture: expected text, found 7",
         ),
         ("[materials.red]\ndiffuse_texture = 'vase.obj'", "vase/vase.obj: expected an image that can be read"),
         ("[[sphere]]\ncenter = [0, 0, 0]", "vase/scene.toml: sphere[0].radius: expected a number, found nothing"),

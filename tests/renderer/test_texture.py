@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from renderer.camera import Camera
-from renderer.errors import SceneError
+from renderer.errors import SceneError, SettingsError
 from renderer.pipeline import Renderer
 from renderer.scene import Material, Scene, Sphere, Surroundings, Texture
 from renderer.texture import srgb_to_linear, wrap
@@ -105,6 +105,33 @@ def test_a_picture_repeats(renderer: Renderer) -> None:
             np.testing.assert_allclose(
                 look_up(renderer, texture, u + i, v + j), look_up(renderer, texture, u, v), atol=1e-5
             )
+
+
+@pytest.mark.parametrize(
+    ("coordinate", "wrap", "place"),
+    [
+        (-0.3, "clamp", 0.0), (1.3, "clamp", 1.0), (1e9, "clamp", 1.0), (-1e9, "clamp", 0.0), (0.4, "clamp", 0.4),
+        (-0.3, "mirror", 0.3), (1.3, "mirror", 0.7), (2.3, "mirror", 0.3), (-1e-9, "mirror", 1e-9),
+        (math.nan, "clamp", 0.0), (math.nan, "mirror", 0.0), (math.inf, "mirror", 0.0), (1e300, "mirror", 0.0),
+    ],
+)  # fmt: skip
+def test_beyond_its_edges_a_picture_is_clamped_or_mirrored(
+    renderer: Renderer, coordinate: float, wrap: str, place: float
+) -> None:
+    """As at the place inside; a clamped picture shows its edge texel alone within half a texel of the edge."""
+    codes = picture([[10, 60, 110], [120, 190, 250]])
+    beyond = dataclasses.replace(codes, wrap_u=wrap, wrap_v=wrap)
+    inside = dataclasses.replace(codes, wrap_u="clamp", wrap_v="clamp")
+    for u, v, iu, iv in ((coordinate, 0.25, place, 0.25), (0.5, coordinate, 0.5, place)):
+        np.testing.assert_allclose(look_up(renderer, beyond, u, v), look_up(renderer, inside, iu, iv), atol=1e-6)
+    np.testing.assert_allclose(look_up(renderer, inside, 0.0, 0.25), linear(120), rtol=4 * U)
+    np.testing.assert_allclose(look_up(renderer, inside, 0.0, 1.0), linear(10), rtol=4 * U)
+    np.testing.assert_allclose(look_up(renderer, inside, 1.0, 0.0), linear(250), rtol=4 * U)
+
+
+def test_an_unknown_wrap_is_refused() -> None:
+    with pytest.raises(SettingsError, match="wrap_v: expected one of repeat, clamp, mirror, found 'tile'"):
+        Texture(np.zeros((1, 1, 3), np.uint8), wrap_v="tile")
 
 
 def test_every_code_comes_out_of_a_picture_as_it_went_in(renderer: Renderer) -> None:

@@ -1,0 +1,111 @@
+"""All pictures of a scene in one array, each with smaller copies of itself for places where it is seen small."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.kernel import kernel
+from renderer.scene import WRAPS, Texture
+from renderer.texture import srgb_to_linear
+from renderer.tonemap import FIRST_CODES, THRESHOLDS, srgb_code
+
+PICTURE = np.dtype(
+    [
+        ("start", np.int64),
+        ("width", np.int64),
+        ("height", np.int64),
+        ("levels", np.int64),
+        ("texels", np.float64),
+        ("wrap_u", np.int64),
+        ("wrap_v", np.int64),
+    ]
+)
+"""One level of a picture: its first texel, its size, and, the same for all its levels, how many levels there
+are, the number of texels of the largest, and rows of WRAPS."""
+
+
+class TextureAtlas(NamedTuple):
+    """Pictures one after another, each followed by its smaller levels, down to one texel.
+
+    Attributes:
+        texels: (n,) uint32 sRGB codes, red | green << 8 | blue << 16, row by row, row 0 of each picture
+            at the top.
+        pictures: (k,) PICTURE, the levels of each picture in a row, the largest first.
+        linear: (256,) float64 linear light of each code (IEC 61966-2-1).
+    """
+
+    texels: NDArray[np.uint32]
+    pictures: NDArray[np.void]
+    linear: NDArray[np.float64]
+
+
+def build_atlas(textures: list[Texture]) -> tuple[TextureAtlas, dict[Texture, int]]:
+    """Lay `textures` one after another with their smaller levels; also the row of each one's largest level."""
+    linear = srgb_to_linear(np.arange(256) / 255)
+    texels: list[NDArray[np.uint32]] = []
+    rows: list[tuple[int, int, int, int, float, int, int]] = []
+    row_of = {}
+    start = 0
+    for texture in textures:
+        row_of[texture] = len(rows)
+        levels = _levels(texture, linear)
+        wraps = WRAPS.index(texture.wrap_u), WRAPS.index(texture.wrap_v)
+        for level in levels:
+            height, width = level.shape
+            rows.append((start, width, height, len(levels), float(levels[0].size), *wraps))
+            texels.append(level.ravel())
+            start += level.size
+    pictures = np.array(rows, dtype=PICTURE) if rows else np.zeros(0, dtype=PICTURE)
+    return TextureAtlas(np.concatenate([*texels, np.zeros(1, np.uint32)]), pictures, linear), row_of
+
+
+def _levels(texture: Texture, linear: NDArray[np.float64]) -> list[NDArray[np.uint32]]:
+    """(h, w) uint32 codes of a texture, and of each half of it down to one texel."""
+    levels = [texture.pixels.astype(np.uint32) @ np.array([1, 1 << 8, 1 << 16], dtype=np.uint32)]
+    while levels[-1].size > 1:
+        height, width = levels[-1].shape
+        levels.append(np.zeros((max(1, height // 2), max(1, width // 2)), dtype=np.uint32))
+        shrink(levels[-2], linear, THRESHOLDS, FIRST_CODES, levels[-1])
+    return levels
+
+
+@kernel
+def shrink(
+    texels: NDArray[np.uint32],
+    linear: NDArray[np.float64],
+    thresholds: NDArray[np.float32],
+    first_codes: NDArray[np.uint8],
+    smaller: NDArray[np.uint32],
+) -> None:
+    """Fill a picture with the mean linear light of a larger one over each of its texels.
+
+    Args:
+        texels: (h, w) uint32 codes of the larger one.
+        linear: (256,) float64 linear light of each code.
+        thresholds, first_codes: of `tonemap`.
+        smaller: (h2, w2) uint32, written; its texels need not hold whole texels of the larger one.
+    """
+    height, width = texels.shape
+    rows, columns = smaller.shape
+    tall, wide = height / rows, width / columns
+    for row in range(rows):
+        top, bottom = row * tall, min((row + 1) * tall, float(height))
+        for column in range(columns):
+            left, right = column * wide, min((column + 1) * wide, float(width))
+            red, green, blue = 0.0, 0.0, 0.0
+            for y in range(int(top), int(np.ceil(bottom))):
+                down = min(bottom, y + 1.0) - max(top, float(y))
+                for x in range(int(left), int(np.ceil(right))):
+                    share = down * (min(right, x + 1.0) - max(left, float(x)))
+                    code = texels[y, x]
+                    red += share * linear[code & 255]
+                    green += share * linear[(code >> 8) & 255]
+                    blue += share * linear[(code >> 16) & 255]
+            area = (bottom - top) * (right - left)
+            r = srgb_code(np.float32(red / area), thresholds, first_codes)
+            g = srgb_code(np.float32(green / area), thresholds, first_codes)
+            b = srgb_code(np.float32(blue / area), thresholds, first_codes)
+            smaller[row, column] = np.uint32(r | (g << 8) | (b << 16))
