@@ -350,7 +350,7 @@ class Session:
         if not progress.lossless.done():
             return False
         progress.over = True
-        final = replace(taken, step=replace(taken.step, phase="final", format=LOSSLESS), asked_ns=self._clock())
+        final = replace(taken, step=replace(taken.step, phase="final", format=LOSSLESS))
         try:
             self._show(final, progress.lossless.result())
         except Exception as error:

@@ -1,177 +1,259 @@
-// The page: the mouse over the picture is the gaze; what it costs is beside it.
+// The page put together: a full-screen picture that follows the eye, and beside it what that costs.
 
-import { FrameSource, NotNow } from "./frame_source.js";
+import { Stage } from "./canvas.js";
+import { PointerGaze } from "./gaze.js";
+import { Keys } from "./keys.js";
+import { askToken, Notices } from "./notices.js";
+import { Orbit } from "./orbit.js";
+import { legendOf, Overlays } from "./overlays.js";
+import { Panel } from "./panel.js";
+import { ScenePicker } from "./scenes.js";
+import { CardFitting, ScreenSize } from "./screen.js";
+import { Service, Token } from "./service.js";
+import { Settings } from "./settings.js";
+import { Stream } from "./stream.js";
+import { Targets } from "./targets.js";
 
-const CM_PER_CSS_PX = 2.54 / 96;
-const STAGES = ["wait", "map", "trace", "reconstruct", "encode"];
-const RAY_KINDS = ["primary", "shadow", "reflection", "refraction"];
+const SESSION_KEY = "gazetrace-stream";
+const CENTRE = { x: 0.5, y: 0.5 };
 
 const element = (id) => document.getElementById(id);
-const controls = element("controls");
 const view = element("view");
-const source = new FrameSource({ onFrame: show, onError: report, askToken });
 
-let size = null; // of the view: device pixels and CSS pixels
-let gaze = null; // as shares of the view, so that it survives a change of size
-let askedToken = null;
-
-function order() {
-  const field = (name) => controls.elements[name].value;
-  return {
-    scene: field("scene"),
-    gaze: { x: gaze.x * size.width_px, y: gaze.y * size.height_px },
-    display: {
-      width_px: size.width_px,
-      height_px: size.height_px,
-      width_cm: size.width_css * CM_PER_CSS_PX,
-      height_cm: size.height_css * CM_PER_CSS_PX,
-      distance_cm: Number(field("distance_cm")),
-    },
-    quality: {
-      map: field("map"),
-      samples_per_cell: Number(field("samples")),
-      acuity: { scale: cellScale() },
-    },
-    format: field("format"),
-    show_cells: controls.elements.show_cells.checked,
-  };
-}
-
-function ask() {
-  if (size && gaze && controls.elements.scene.value && controls.reportValidity()) source.ask(order());
-}
-
-function show({ picture, cells, header, roundTripMs }) {
-  element("banner").hidden = true;
-  element("status").textContent = "";
-  paint(element("frame"), picture);
-  element("cells").hidden = !cells;
-  if (cells) paint(element("cells"), cells);
-  const pixelCss = size.width_css / size.width_px;
-  element("gaze").hidden = false;
-  element("gaze").style.transform = `translate(${header.gaze.x * pixelCss}px, ${header.gaze.y * pixelCss}px)`;
-  tell(header, roundTripMs);
-}
-
-function paint(canvas, picture) {
-  canvas.width = picture.width;
-  canvas.height = picture.height;
-  canvas.style.width = `${(picture.width * size.width_css) / size.width_px}px`;
-  canvas.style.height = `${(picture.height * size.height_css) / size.height_px}px`;
-  canvas.getContext("2d").drawImage(picture, 0, 0);
-  picture.close();
-}
-
-function tell(header, roundTripMs) {
-  const pixels = header.width * header.height;
-  const rays = RAY_KINDS.reduce((sum, kind) => sum + header.rays[kind], 0);
-  write("number", header.frame);
-  write("size", `${header.width} × ${header.height}`);
-  write("gaze_shown", `${Math.round(header.gaze.x)}, ${Math.round(header.gaze.y)}`);
-  write("cell_count", count(header.map.cells));
-  write("cell_share", `${percent(header.map.cells / pixels)} of px`);
-  write("reused", count(header.cells_reused));
-  write("reused_share", percent(header.cells_reused / header.map.cells));
-  write("rays", count(rays));
-  write("rays_per_pixel", `${(rays / pixels).toFixed(2)} a px`);
-  for (const kind of RAY_KINDS) write(kind, count(header.rays[kind]));
-  write("rms", accuracy(header.error.rms));
-  write("foveal_rms", accuracy(header.error.foveal_rms));
-  write("total", header.timing_ms.total.toFixed(1));
-  for (const stage of STAGES) {
-    write(stage, header.timing_ms[stage].toFixed(1));
-    document.querySelector(`#bar .${stage}`).style.flexGrow = header.timing_ms[stage];
-  }
-  write("round_trip", roundTripMs.toFixed(1));
-  write("effects", header.effects.length ? `Simulates ${header.effects.join(", ")}` : "Calls for no effect");
-}
-
-function report(error) {
-  if (error instanceof NotNow) {
-    element("status").textContent = error.message;
-  } else {
-    element("banner").textContent = error.message;
-    element("banner").hidden = false;
-  }
-}
-
-function askToken(why) {
-  askedToken ??= new Promise((resolve) => {
-    const dialog = element("token");
-    const field = dialog.querySelector("input");
-    write("token_why", why);
-    field.value = "";
-    dialog.addEventListener("close", () => {
-      askedToken = null;
-      resolve(field.value);
-    }, { once: true });
-    dialog.addEventListener("cancel", (event) => event.preventDefault());
-    dialog.showModal();
-  });
-  return askedToken;
-}
-
-function follow(event) {
-  const box = view.getBoundingClientRect();
-  gaze = { x: (event.clientX - box.left) / box.width, y: (event.clientY - box.top) / box.height };
-  ask();
-}
-
-function measure([entry]) {
-  const css = entry.contentBoxSize[0];
-  const device = entry.devicePixelContentBoxSize?.[0];
-  size = {
-    width_css: css.inlineSize,
-    height_css: css.blockSize,
-    width_px: device?.inlineSize ?? Math.round(css.inlineSize * devicePixelRatio),
-    height_px: device?.blockSize ?? Math.round(css.blockSize * devicePixelRatio),
-  };
-  ask();
-}
-
-function cellScale() {
-  return 2 ** (Number(controls.elements.scale.value) / 2);
-}
-
-function write(id, text) {
-  element(id).textContent = text;
-}
-
-function count(number) {
-  return number.toLocaleString("en");
-}
-
-function percent(share) {
-  return `${(100 * share).toFixed(1)} %`;
-}
-
-function accuracy(error) {
-  return error === null ? "–" : error.toPrecision(2);
-}
-
-async function nameScenes() {
-  for (const { id } of await source.scenes(false)) controls.elements.scene.add(new Option(id, id));
-}
-
-async function describeScenes() {
-  for (const scene of await source.scenes(true)) {
-    const option = [...controls.elements.scene.options].find(({ value }) => value === scene.id);
-    if (!option) continue;
-    option.text = scene.error ? `${scene.id} (broken)` : scene.title || scene.id;
-    option.title = scene.error ?? `${count(scene.triangles)} triangles, ${scene.spheres} spheres`;
-  }
-}
-
-controls.addEventListener("input", () => {
-  controls.elements.scale_shown.value = `× ${Number(cellScale().toPrecision(3))}`;
-  ask();
+const notices = new Notices();
+const panel = new Panel();
+const token = new Token(askToken);
+const service = new Service(token);
+const screen = new ScreenSize();
+const settings = new Settings({ form: element("settings"), onChange: changed });
+const orbit = new Orbit({ view, onTurn: want });
+const stage = new Stage({ view, stage: element("stage"), frame: element("frame"), onResize: want });
+const stream = new Stream({
+  token,
+  session: new URLSearchParams(location.search).get("session") ?? sessionStorage.getItem(SESSION_KEY),
+  on: {
+    state: connectionChanged,
+    ready,
+    status: tellStatus,
+    target: (message) => targets.show(message, display),
+    error: refuse,
+    clock: (trip) => panel.clock(trip),
+    frame: show,
+  },
 });
-controls.addEventListener("submit", (event) => event.preventDefault());
-view.addEventListener("pointermove", follow);
-view.addEventListener("pointerdown", follow);
+const gaze = new PointerGaze({
+  view,
+  toDisplay: (x, y) => stage.toDisplay(x, y),
+  look: (fields) => stream.look(fields),
+  busy: () => orbit.turning,
+});
+const targets = new Targets({ layer: element("target"), toWindow: (share) => stage.toWindow(share) });
+const overlays = new Overlays({
+  marks: element("marks"),
+  drawn: element("drawn"),
+  cells: (query) => service.cells(query),
+  on: { gaze: true },
+});
+const fitting = new CardFitting({ dialog: element("fitting"), screen, onKept: changed });
+const picker = new ScenePicker({
+  popover: element("scenes"),
+  label: element("scene_name"),
+  service,
+  onPick: (id) => { location.hash = id; },
+});
 
-gaze = { x: 0.5, y: 0.5 };
-await nameScenes();
-element("status").textContent = "Waiting for the first frame …";
-new ResizeObserver(measure).observe(view);
-await describeScenes();
+let scene = null;
+let display = null; // of the configuration in force, complete
+let quality = null;
+
+/** State to the service what this page wants to see. */
+function want() {
+  element("reset_view").disabled = !orbit.moved;
+  if (!scene || !stage.measured || !(settings.distanceCm > 0)) return;
+  const size = stage.displaySize(settings.size);
+  const pitchCm = screen.pitchCm(stage.ratio) * stage.scaleOf(size);
+  quality = settings.quality;
+  tellScreen(size, pitchCm);
+  stream.want({
+    scene,
+    display: {
+      ...size,
+      width_cm: size.width_px * pitchCm,
+      height_cm: size.height_px * pitchCm,
+      distance_cm: settings.distanceCm,
+    },
+    camera: orbit.camera,
+    quality,
+    ...settings.encoding,
+  });
+}
+
+function changed(control) {
+  if (control === "distance_cm") screen.keep({ distance_cm: settings.distanceCm });
+  if (control === "source") followSource();
+  settings.blame(null);
+  want();
+}
+
+function followSource() {
+  gaze.on = !settings.tracked;
+  document.body.classList.toggle("tracked", settings.tracked);
+  element("hold").disabled = settings.tracked;
+  if (settings.tracked) stream.lookAway();
+  else gaze.lookAt(CENTRE);
+}
+
+function connectionChanged(state) {
+  notices.connection(state);
+  if (state.name === "lost") panel.forget();
+  if (state.name === "locked") notices.settle();
+}
+
+function ready(message, own) {
+  sessionStorage.setItem(SESSION_KEY, message.session);
+  element("session").value = message.session;
+  notices.connection({ name: "live" });
+  if (message.config === null) return;
+  notices.settle();
+  settings.blame(null);
+  display = message.display;
+  stage.display = display;
+  if (own) orbit.home ??= message.camera;
+  panel.configured(message, quality);
+}
+
+function refuse({ message, field }) {
+  notices.problem(message);
+  notices.status("");
+  settings.blame(field);
+}
+
+function tellStatus({ viewers, gaze_sources, gaze_state }) {
+  element("viewers").textContent = viewers;
+  element("sources").textContent = gaze_sources;
+  element("gaze_state").textContent = gaze_state;
+  if (settings.tracked && gaze_state === "none") notices.status("Waiting for the tracker's gaze …");
+}
+
+function show({ header, picture }) {
+  notices.status(header.gaze_state === "lost" ? "The gaze is lost: the whole screen is rendered evenly." : "");
+  stage.show(picture);
+  panel.frame(header, header.gaze && gaze.seenAt(header.gaze));
+  overlays.show({ gaze: header.gaze, display, query: cellQuery(header), pixelRatio: stage.ratio });
+}
+
+function cellQuery(header) {
+  return header.gaze && {
+    gaze_x: header.gaze.x,
+    gaze_y: header.gaze.y,
+    ...display,
+    map: header.map.kind,
+    gaze_bucket_px: header.map.bucket_px,
+    samples_per_cell: Math.max(1, Math.round(header.samples)),
+    acuity_model: quality.acuity.model,
+    acuity_scale: header.acuity_scale,
+    margin_deg: quality.acuity.margin_deg,
+  };
+}
+
+function tellScreen(size, pitchCm) {
+  const [width, height] = [size.width_px, size.height_px].map((side) => (side * pitchCm).toFixed(1));
+  const perDegree = (settings.distanceCm * Math.tan(Math.PI / 180)) / pitchCm;
+  const how = screen.calibrated ? "measured" : "assumed from 96 pixels to the inch";
+  element("screen_told").textContent =
+    `${size.width_px} × ${size.height_px} px, ${width} × ${height} cm, ${how}; ${perDegree.toFixed(0)} px a degree.`;
+}
+
+function chooseScene() {
+  scene = decodeURIComponent(location.hash.slice(1)) || scene;
+  orbit.home = null;
+  picker.choose(scene);
+  notices.status(`Loading ${scene} …`);
+  want();
+}
+
+function toggleOverlay(name) {
+  overlays.toggle(name);
+  const on = overlays.on;
+  for (const button of document.querySelectorAll("[data-overlay]")) {
+    button.setAttribute("aria-pressed", Boolean(on[button.dataset.overlay]));
+  }
+  const legend = legendOf(on.cells ? "cells" : on.rays ? "rays" : "");
+  element("legend").hidden = !legend;
+  if (!legend) return;
+  element("legend_title").textContent = legend.title;
+  element("legend_steps").replaceChildren(...legend.steps.map(([label, colour]) => {
+    const step = document.createElement("li");
+    const sample = document.createElement("i");
+    if (colour) sample.style.background = colour;
+    step.append(sample, label);
+    return step;
+  }));
+}
+
+function toggleHold() {
+  if (settings.tracked) return;
+  gaze.held = !gaze.held;
+  element("hold").setAttribute("aria-pressed", gaze.held);
+}
+
+function togglePanel() {
+  const hidden = document.body.classList.toggle("bare");
+  element("panel_toggle").setAttribute("aria-pressed", !hidden);
+}
+
+function toggleFullScreen() {
+  if (document.fullscreenElement) document.exitFullscreen();
+  else document.documentElement.requestFullscreen();
+}
+
+async function copySession() {
+  element("session").select();
+  await navigator.clipboard?.writeText(element("session").value);
+}
+
+const help = () => element("help").showModal();
+const keys = new Keys([
+  { keys: ["?"], does: "this sheet", run: help },
+  { keys: ["s"], does: "choose a scene", run: () => element("scenes").togglePopover() },
+  { keys: ["p"], does: "show or hide the panel", run: togglePanel },
+  { keys: ["f"], does: "full screen", run: toggleFullScreen },
+  { keys: [" "], shown: "Space", does: "hold the gaze, free the pointer", run: toggleHold },
+  { keys: ["t"], does: "gaze from a tracker, or from the pointer", run: () => { settings.tracked = !settings.tracked; } },
+  { keys: ["g"], does: "draw the gaze", run: () => toggleOverlay("gaze") },
+  { keys: ["r"], does: "draw 2.5, 5 and 10 degrees around it", run: () => toggleOverlay("region") },
+  { keys: ["c"], does: "draw the cells", run: () => toggleOverlay("cells") },
+  { keys: ["d"], does: "draw the density of rays", run: () => toggleOverlay("rays") },
+  { keys: ["[", "]"], shown: "[  ]", does: "half, twice the samples", run: (key) => settings.stepSamples(key === "]") },
+  { keys: ["ArrowLeft"], shown: "← →", does: "turn the camera", run: () => orbit.step(-1, 0) },
+  { keys: ["ArrowRight"], run: () => orbit.step(1, 0) },
+  { keys: ["ArrowUp"], shown: "↑ ↓", does: "raise, lower the camera", run: () => orbit.step(0, 1) },
+  { keys: ["ArrowDown"], run: () => orbit.step(0, -1) },
+  { keys: ["+", "=", "-"], shown: "+  −", does: "nearer, farther", run: (key) => orbit.near(key === "-" ? -1 : 1) },
+  { keys: ["0"], does: "the scene's own view", run: () => orbit.reset() },
+  { keys: ["Escape"], shown: "Esc", does: "close what is open", run: () => targets.hide() },
+]);
+keys.list(element("help_keys"));
+
+for (const button of document.querySelectorAll("[data-overlay]")) {
+  button.addEventListener("click", () => toggleOverlay(button.dataset.overlay));
+}
+for (const [id, run] of Object.entries({
+  hold: toggleHold,
+  reset_view: () => orbit.reset(),
+  full_screen: toggleFullScreen,
+  help_open: help,
+  panel_toggle: togglePanel,
+  calibrate: () => fitting.open(),
+  copy: copySession,
+  connection: () => stream.hurry(),
+})) element(id).addEventListener("click", run);
+addEventListener("hashchange", chooseScene);
+
+settings.distanceCm = screen.distanceCm;
+gaze.lookAt(CENTRE);
+stream.start();
+settings.offer(await service.qualitySchema());
+[scene] = await picker.load();
+chooseScene();
+await picker.describe();

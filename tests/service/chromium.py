@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import itertools
 import json
 import os
@@ -11,13 +12,18 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from service.protocol import FrameHeader, unpack_frame
+
 NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
 PATIENCE_S = 60
+
+TEXT, BINARY = 1, 2
+"""Opcodes of a WebSocket's frames (RFC 6455, 5.2)."""
 
 # Chromium reads commands from descriptor 3 and writes events to 4.
 LAUNCH = (
@@ -31,7 +37,7 @@ def find_chromium() -> str | None:
 
 
 class Page:
-    """One page: commands, what it evaluates, and every event since it was opened."""
+    """A browser with one page at a time: commands, what it evaluates, and every event since it was opened."""
 
     def __init__(self, commands: int, events: int) -> None:
         self._commands = os.fdopen(commands, "wb", buffering=0)
@@ -39,20 +45,48 @@ class Page:
         self._ids = itertools.count(1)
         self._replies: dict[int, queue.Queue[dict[str, Any]]] = {}
         self.events: list[dict[str, Any]] = []
+        self._context: str | None = None
         self._session: str | None = None
         self._listener = threading.Thread(target=self._listen, daemon=True)
         self._listener.start()
 
-    def open(self, url: str, width: int, height: int) -> None:
-        """A new page, listened to from its beginning."""
-        target = self.command("Target.createTarget", url="about:blank")["targetId"]
+    def open(
+        self, url: str, width: int, height: int, ratio: float = 1.0, settings: Mapping[str, str] | None = None
+    ) -> None:
+        """A new page that knows nothing of earlier ones, listened to from its beginning.
+
+        Args:
+            url: of the page.
+            width, height: of its window [CSS px].
+            ratio: device pixels to a CSS pixel.
+            settings: what an earlier visit would have kept.
+        """
+        self.leave()
+        self._context = self.command("Target.createBrowserContext")["browserContextId"]
+        target = self.command("Target.createTarget", url="about:blank", browserContextId=self._context)["targetId"]
         self._session = self.command("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
         for domain in ("Page", "Runtime", "Log", "Network"):
             self.command(f"{domain}.enable")
-        self.command(
-            "Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False
-        )
+        self.resize(width, height, ratio)
+        if settings is not None:
+            self.command("Page.navigate", url=url.partition("#")[0] + "docs")
+            self.wait_for("location.pathname.endsWith('docs')")
+            self.evaluate(f"localStorage.setItem('gazetrace-settings', {json.dumps(json.dumps(settings))})")
         self.command("Page.navigate", url=url)
+
+    def leave(self) -> None:
+        """Close the page, and forget what it said and stored."""
+        self._session = None
+        if self._context is not None:
+            self.command("Target.disposeBrowserContext", browserContextId=self._context)
+            self._context = None
+        self.events.clear()
+
+    def resize(self, width: int, height: int, ratio: float = 1.0) -> None:
+        """Give the page another window."""
+        self.command(
+            "Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=ratio, mobile=False
+        )
 
     def close(self) -> None:
         """Let go of the pipes, once the browser has ended."""
@@ -92,6 +126,64 @@ class Page:
         """Move the mouse [CSS px]."""
         self.command("Input.dispatchMouseEvent", type="mouseMoved", x=x, y=y)
 
+    def drag(self, start: tuple[float, float], end: tuple[float, float], button: str, modifiers: int = 0) -> None:
+        """Press a mouse button, move and let go [CSS px]."""
+        for kind, (x, y) in (("mousePressed", start), ("mouseMoved", end), ("mouseReleased", end)):
+            self.command(
+                "Input.dispatchMouseEvent", type=kind, x=x, y=y, button=button, clickCount=1, modifiers=modifiers
+            )
+
+    def press(self, key: str) -> None:
+        """Press a key and let go, by its name in a KeyboardEvent."""
+        code = {"Escape": 27, "Enter": 13, "Tab": 9}.get(key, 0)
+        text = {"text": key} if len(key) == 1 else {}
+        self.command("Input.dispatchKeyEvent", type="keyDown", key=key, windowsVirtualKeyCode=code, **text)
+        self.command("Input.dispatchKeyEvent", type="keyUp", key=key, windowsVirtualKeyCode=code)
+
+    def click(self, selector: str) -> None:
+        """Click on an element as its own script would."""
+        self.evaluate(f"document.querySelector({json.dumps(selector)}).click()")
+
+    def enter(self, selector: str, value: object) -> None:
+        """Set a field and say that it was changed."""
+        self.evaluate(
+            f"""(() => {{
+              const field = document.querySelector({json.dumps(selector)});
+              field.value = {json.dumps(str(value))};
+              field.dispatchEvent(new Event("input", {{ bubbles: true }}));
+            }})()"""
+        )
+
+    def said(self, kind: str) -> list[dict[str, Any]]:
+        """The messages of this type that the page has sent over its WebSockets."""
+        return [message for message in map(json.loads, self._texts("webSocketFrameSent")) if message["type"] == kind]
+
+    def heard(self, kind: str) -> list[dict[str, Any]]:
+        """The messages of this type that the page has received over its WebSockets."""
+        return [
+            message for message in map(json.loads, self._texts("webSocketFrameReceived")) if message["type"] == kind
+        ]
+
+    def shown(self, which: Callable[[FrameHeader], bool] = lambda _: True) -> FrameHeader:
+        """Wait until the page has acknowledged, and so drawn, a frame like this; the header of the newest."""
+        deadline = time.monotonic() + PATIENCE_S
+        while time.monotonic() < deadline:
+            acknowledged = {message["frame"] for message in self.said("ack")[-4:]}
+            for event in reversed(self.events):
+                response = event["params"].get("response", {})
+                if event["method"] == "Network.webSocketFrameReceived" and response["opcode"] == BINARY:
+                    header = unpack_frame(base64.b64decode(response["payloadData"])).header
+                    if header.frame in acknowledged:
+                        if which(header):
+                            return header
+                        break
+            self.evaluate("new Promise((done) => setTimeout(done, 16))")
+        raise AssertionError(f"no such frame; the page says: {self.evaluate('document.body.innerText')}")
+
+    def _texts(self, event_name: str) -> list[str]:
+        frames = [event["params"]["response"] for event in self.events if event["method"] == f"Network.{event_name}"]
+        return [frame["payloadData"] for frame in frames if frame["opcode"] == TEXT]
+
     def complaints(self) -> list[str]:
         """Console errors and warnings, exceptions, and what the security policy blocked."""
         found = []
@@ -104,14 +196,6 @@ class Page:
             elif event["method"] == "Log.entryAdded" and parameters["entry"]["level"] in ("error", "warning"):
                 found.append(f"{parameters['entry']['text']} {parameters['entry'].get('url', '')}")
         return found
-
-    def requests(self, path: str) -> list[dict[str, Any]]:
-        """The JSON bodies that the page has sent to `path`."""
-        return [
-            json.loads(event["params"]["request"]["postData"])
-            for event in self.events
-            if event["method"] == "Network.requestWillBeSent" and event["params"]["request"]["url"].endswith(path)
-        ]
 
     def _listen(self) -> None:
         received = b""
