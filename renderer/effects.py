@@ -12,11 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from renderer.effect_choice import EFFECTS, EffectChoice
 from renderer.light_reach import reaching_lights
 from renderer.scene import BLACK, Light, Material, Mesh, PointLight, RectangleLight, Scene, SphereLight, Texture
-
-EFFECTS = ("textures", "specular", "shadows", "soft_shadows", "reflection", "refraction")
-"""All there are: `shadows` are the hard ones of point lights, `soft_shadows` those of lights with a size."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,9 +32,15 @@ class Effect:
 
 @dataclass(frozen=True, slots=True)
 class EffectPlan:
-    """The effects a scene calls for, in the order in which a ray meets them."""
+    """The effects that run, in the order in which a ray meets them.
+
+    Attributes:
+        effects: with their reasons.
+        forced: names of those that run on every surface, whether anything calls for them or not.
+    """
 
     effects: tuple[Effect, ...]
+    forced: frozenset[str] = frozenset()
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -58,7 +62,7 @@ def plan_effects(scene: Scene) -> EffectPlan:
         "specular": lambda material: has_highlight(material) and bool(lights),
         "shadows": lambda material: _takes_light(material) and bool(casting["shadows"]) and casters > 0,
         "soft_shadows": lambda material: _takes_light(material) and bool(casting["soft_shadows"]) and casters > 0,
-        "reflection": lambda material: material.reflection != BLACK or _is_boundary(material),
+        "reflection": lambda material: material.reflection != BLACK or is_boundary(material),
         "refraction": lambda material: material.transmission != BLACK,
     }
     effects = []
@@ -69,6 +73,18 @@ def plan_effects(scene: Scene) -> EffectPlan:
         elif called_by:
             effects.append(Effect(name, _bearers(called_by, users)))
     return EffectPlan(tuple(effects))
+
+
+def forced_plan(plan: EffectPlan, choice: EffectChoice) -> EffectPlan:
+    """`plan` with some effects forced on or off."""
+    reasons = {effect.name: effect.reason for effect in plan.effects}
+    for word in choice:
+        if word[0] == "+":
+            reasons.setdefault(word[1:], "forced on")
+        else:
+            reasons.pop(word[1:], None)
+    forced = frozenset(word[1:] for word in choice if word[0] == "+")
+    return EffectPlan(tuple(Effect(name, reasons[name]) for name in EFFECTS if name in reasons), forced)
 
 
 def textures_of(material: Material) -> list[Texture]:
@@ -113,7 +129,7 @@ def _takes_light(material: Material) -> bool:
     return material.diffuse != BLACK or has_highlight(material)
 
 
-def _is_boundary(material: Material) -> bool:
+def is_boundary(material: Material) -> bool:
     """Whether Fresnel's equations mirror a part of the light (not where the index stays the same)."""
     return material.transmission != BLACK and material.ior != 1.0
 

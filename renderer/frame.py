@@ -90,6 +90,7 @@ class FrameCost:
         cells_traced, cells_reused: cells traced for this frame, and taken from the sample store as they were.
         rays: rays traced for this frame.
         effects: names of the effects that the scene calls for and that ran.
+        effect_reasons: what in the scene calls for each, one line.
         rms_error, foveal_rms_error: estimated standard error of the linear frame over the screen and
             within 2.5 deg of the gaze; None with fewer than two samples in any cell (or nothing there).
         rejected_samples: samples that were not finite and count as black; 0 unless something is broken.
@@ -110,6 +111,7 @@ class FrameCost:
     cells_reused: int
     rays: RayCounts
     effects: tuple[str, ...]
+    effect_reasons: tuple[str, ...]
     rms_error: float | None
     foveal_rms_error: float | None
     rejected_samples: int

@@ -7,6 +7,8 @@ dealt with here.
 
 from __future__ import annotations
 
+import copy
+
 import numpy as np
 from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore import EmbreeDevice
@@ -50,6 +52,14 @@ class Intersector:
         self._seen = _embree_scene(vertices, faces)
         self._casting = self._seen if casts.all() else _embree_scene(vertices, faces[casts])
         self._sphere_casts = bool(spheres.casts.any())
+
+    def all_casting(self) -> Intersector:
+        """The same, but with everything casting shadows."""
+        other = copy.copy(self)
+        other._casting = self._seen
+        other._spheres = self._spheres._replace(casts=np.ones_like(self._spheres.casts))
+        other._sphere_casts = len(self._spheres.radius) > 0
+        return other
 
     def nearest(self, origin: NDArray[np.float32], direction: NDArray[np.float32]) -> Hits:
         """Nearest hit of each ray.

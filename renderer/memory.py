@@ -106,5 +106,6 @@ def _store_key(prepared: PreparedScene, request: FrameRequest, numbered: Numbere
         quality.antialiasing,
         quality.shadow_samples,
         quality.max_depth,
+        quality.effects,
         None if quality.map != "scanline" else "none" if numbered is None else numbered.identity,
     )

@@ -136,5 +136,12 @@ def _keys(prepared: PreparedScene, request: FrameRequest) -> tuple[Hashable, Has
     return (
         ("map", quality.map, size),
         ("frame", quality.reconstruction, request.linear, size),
-        ("sample", prepared.identity, quality.max_depth, shadow_rays_each(quality), quality.antialiasing),
+        (
+            "sample",
+            prepared.identity,
+            quality.max_depth,
+            shadow_rays_each(quality),
+            quality.antialiasing,
+            quality.effects,
+        ),
     )

@@ -9,6 +9,7 @@ from renderer.cellmap import CellMap
 from renderer.deadline import NS_PER_MS, affordable_samples, fitted
 from renderer.display import Display
 from renderer.eccentricity import eccentricity_deg
+from renderer.forced import with_effects
 from renderer.frame import Frame, FrameCost, FrameRequest, StageTimes
 from renderer.gaze import Gaze
 from renderer.growth import grow
@@ -83,6 +84,7 @@ class Renderer:
             Abandoned: within about a block of rays after `abandon` is set. What was traced by then is kept.
         """
         began = time.perf_counter_ns()
+        prepared = with_effects(prepared, request.quality.effects)
         pool = self._pool.until(abandon)
         rates = self._pace.rates(prepared, request)
         wanted = request.quality.samples_per_cell if request.samples is None else request.samples
@@ -124,6 +126,7 @@ class Renderer:
             cells_reused=cells.cells - growth.cells,
             rays=growth.rays,
             effects=prepared.plan.names,
+            effect_reasons=tuple(effect.reason for effect in prepared.plan.effects),
             rms_error=rms,
             foveal_rms_error=foveal_rms,
             rejected_samples=growth.rejected,

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from renderer.area_light import area_light_table
 from renderer.atlas import TextureAtlas, build_atlas
 from renderer.direction import unit
-from renderer.effects import EffectPlan, has_highlight, plan_effects, textures_of
+from renderer.effect_choice import EffectChoice
+from renderer.effects import EffectPlan, has_highlight, is_boundary, plan_effects, textures_of
 from renderer.errors import SceneError
 from renderer.intersection import Intersector
 from renderer.light_reach import reaching_lights
@@ -39,9 +40,15 @@ SPECULAR = 1
 MIRROR = 2
 BOUNDARY = 4
 LIT = 8
+REFRACTS = 16
+MIRROR_ANYWAY = 32
+REFRACTS_ANYWAY = 64
 MICROFACETS = 256
 GRAINED = 512
-"""Bits of what a material calls for: `MICROFACETS` is the base of Ashikhmin and Shirley, `GRAINED` a tangent."""
+SPAWNS = MIRROR | REFRACTS | MIRROR_ANYWAY | REFRACTS_ANYWAY
+"""Bits of what a material calls for: a `BOUNDARY` mirrors by Fresnel's equations, `REFRACTS` sends rays through
+it; the two `ANYWAY` send rays though they bring nothing, as forced effects do; `MICROFACETS` is the base of
+Ashikhmin and Shirley, `GRAINED` a tangent."""
 
 
 _COLOURS = [
@@ -106,6 +113,7 @@ class PreparedScene:
         intersector: what answers rays.
         nbytes: approximate size in memory.
         identity: stands for the scene in caches, so that they do not keep the scene itself in memory.
+        variants: the same with effects forced on or off, by choice, for `with_effects`.
     """
 
     scene: Scene
@@ -117,6 +125,7 @@ class PreparedScene:
     intersector: Intersector
     nbytes: int
     identity: object = field(default_factory=object)
+    variants: dict[EffectChoice, PreparedScene] = field(default_factory=dict)
 
 
 EMBREE_BYTES_A_TRIANGLE = 150
@@ -131,7 +140,7 @@ def prepare(scene: Scene) -> PreparedScene:
     """
     plan = plan_effects(scene)
     center, scale = _centre_and_scale(scene)
-    materials = _used_materials(scene)
+    materials = used_materials(scene)
     atlas, picture = build_atlas(list(dict.fromkeys(itertools.chain(*map(textures_of, materials)))))
     row = {material: index for index, material in enumerate(materials)}
     vertices, faces, facets, tangents, casts = _triangles(scene, row, center, scale)
@@ -189,7 +198,7 @@ MAX_SCALE_EXPONENT = 60
 """Scenes smaller than 2^-60 m are not made larger: a camera 1e15 m away must stay within float32."""
 
 
-def _used_materials(scene: Scene) -> list[Material]:
+def used_materials(scene: Scene) -> list[Material]:
     """Materials that a triangle or sphere has, each once, in order of first use."""
     used = dict.fromkeys(mesh.material for mesh in scene.meshes if len(mesh.faces))
     used.update(dict.fromkeys(sphere.material for sphere in scene.spheres))
@@ -206,15 +215,23 @@ def _material_table(materials: list[Material], picture: dict[Texture, int], plan
             table[row][name] = getattr(material, name)
         for name, texture in (("picture", material.diffuse_texture), ("specular_picture", material.specular_texture)):
             table[row][name] = picture.get(texture, -1) if texture else -1
-        table[row]["calls"] = (
-            (SPECULAR if "specular" in plan.names and has_highlight(material) else 0)
-            | (MIRROR if any(material.reflection) else 0)
-            | (BOUNDARY if any(material.transmission) else 0)
-            | (LIT if any(material.diffuse) or has_highlight(material) else 0)
-            | (MICROFACETS if material.base == "ashikhmin-shirley" else 0)
-            | (GRAINED if _is_grained(material) else 0)
-        )
+        table[row]["calls"] = calls_of(material, plan)
     return table
+
+
+def calls_of(material: Material, plan: EffectPlan) -> int:
+    """The bits of what a material calls for, of what the plan lets run."""
+    return (
+        (SPECULAR if "specular" in plan.names and (has_highlight(material) or "specular" in plan.forced) else 0)
+        | (MIRROR if "reflection" in plan.names and (any(material.reflection) or is_boundary(material)) else 0)
+        | (MIRROR_ANYWAY if "reflection" in plan.forced else 0)
+        | (BOUNDARY if any(material.transmission) else 0)
+        | (REFRACTS if "refraction" in plan.names and any(material.transmission) else 0)
+        | (REFRACTS_ANYWAY if "refraction" in plan.forced else 0)
+        | (LIT if any(material.diffuse) or has_highlight(material) else 0)
+        | (MICROFACETS if material.base == "ashikhmin-shirley" else 0)
+        | (GRAINED if _is_grained(material) else 0)
+    )
 
 
 def _is_grained(material: Material) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from renderer.acuity import Acuity
+from renderer.effect_choice import EffectChoice, require_effect_choice
 from renderer.errors import require_choice, require_integer, require_number
 
 MAPS = ("aligned", "scanline", "full")
@@ -30,6 +31,7 @@ class Quality:
         shadow_samples: shadow rays a cell sends to each area light, 1 to 4096, spread over its camera
             samples: each sends shadow_samples / samples_per_cell of them, rounded up.
         max_depth: how many mirrors and boundaries a ray may meet, 0 to 64.
+        effects: effects forced on (+name) or off (-name); the others run where the scene calls for them.
         acuity: the eye's resolution.
         reconstruction: how cells become pixels: `nearest`, each pixel its cell's colour (the paper's), or
             `smooth`, cells blended into their neighbours.
@@ -46,6 +48,7 @@ class Quality:
     samples_per_cell: int = 4
     antialiasing: str = "stochastic"
     max_depth: int = 5
+    effects: EffectChoice = ()
     shadow_samples: int = 4
     acuity: Acuity = field(default_factory=Acuity)
     reconstruction: str = "nearest"
@@ -57,6 +60,7 @@ class Quality:
         require_integer("quality.samples_per_cell", self.samples_per_cell, 1, MAX_SAMPLES)
         require_choice("quality.antialiasing", self.antialiasing, ANTIALIASING)
         require_integer("quality.shadow_samples", self.shadow_samples, 1, MAX_SAMPLES)
+        require_effect_choice("quality.effects", self.effects)
         require_integer("quality.max_depth", self.max_depth, 0, MAX_DEPTH)
         require_choice("quality.reconstruction", self.reconstruction, RECONSTRUCTIONS)
         if self.deadline_ms is not None:

@@ -14,7 +14,18 @@ from renderer.grain import sphere_tangent, triangle_tangent
 from renderer.kernel import formula, kernel, prefetch
 from renderer.light_samples import LightSamples
 from renderer.lighting import light_from_areas, light_from_points
-from renderer.prepared import BOUNDARY, DENSITY_COLUMN, GRAINED, LIT, MIRROR, Surfaces
+from renderer.prepared import (
+    BOUNDARY,
+    DENSITY_COLUMN,
+    GRAINED,
+    LIT,
+    MIRROR,
+    MIRROR_ANYWAY,
+    REFRACTS,
+    REFRACTS_ANYWAY,
+    SPAWNS,
+    Surfaces,
+)
 from renderer.rays import Hits, Rays, ShadowRays
 from renderer.reflectance import even_light
 from renderer.surface import Surface, sphere_surface, triangle_surface
@@ -169,13 +180,14 @@ def shade(
             n_shadows = light_from_areas(
                 s, material, finish, wr, wg, wb, dx, dy, dz, sample, area_lights, draws, radiance, shadows, n_shadows
             )
-        if not spawn or material.calls & (MIRROR | BOUNDARY) == 0:
+        if not spawn or material.calls & SPAWNS == 0:
             continue
+        anyway = material.calls if max(wr, max(wg, wb)) >= cutoff else 0
         curvature = 0.0
         if primitive >= triangles:
             curvature = (1.0 if s.entering else -1.0) / radius[primitive - triangles]
         spread = np.float64(pencil[ray, 1])
-        if material.calls & BOUNDARY != 0:
+        if material.calls & (BOUNDARY | REFRACTS_ANYWAY) != 0:
             eta = 1.0 / material.ior if s.entering else np.float64(material.ior)
             cosine = -(dx * s.nx + dy * s.ny + dz * s.nz)
             refracted = refracted_cosine(cosine, eta)
@@ -184,8 +196,9 @@ def shade(
             tr = wr * rest * (1.0 - mr) * material.transmission_red
             tg = wg * rest * (1.0 - mg) * material.transmission_green
             tb = wb * rest * (1.0 - mb) * material.transmission_blue
-            mr, mg, mb = share + rest * mr, share + rest * mg, share + rest * mb
-            if max(tr, max(tg, tb)) >= cutoff:
+            if material.calls & BOUNDARY != 0:
+                mr, mg, mb = share + rest * mr, share + rest * mg, share + rest * mb
+            if (material.calls & REFRACTS != 0 and max(tr, max(tg, tb)) >= cutoff) or anyway & REFRACTS_ANYWAY != 0:
                 child_origin[n_children, 0] = s.px - s.offset * s.gx
                 child_origin[n_children, 1] = s.py - s.offset * s.gy
                 child_origin[n_children, 2] = s.pz - s.offset * s.gz
@@ -202,7 +215,7 @@ def shade(
                 n_children += 1
                 counters[REFRACTIONS] += 1
         mr, mg, mb = wr * mr, wg * mg, wb * mb
-        if max(mr, max(mg, mb)) >= cutoff:
+        if (material.calls & MIRROR != 0 and max(mr, max(mg, mb)) >= cutoff) or anyway & MIRROR_ANYWAY != 0:
             child_origin[n_children, 0] = s.px + s.offset * s.gx
             child_origin[n_children, 1] = s.py + s.offset * s.gy
             child_origin[n_children, 2] = s.pz + s.offset * s.gz

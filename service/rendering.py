@@ -178,6 +178,10 @@ class Studio:
             raise OverLimit(
                 "quality.samples_per_cell", f"{quality.samples_per_cell} is more than {limits.max_samples_per_cell}"
             )
+        if quality.shadow_samples > limits.max_samples_per_cell:
+            raise OverLimit(
+                "quality.shadow_samples", f"{quality.shadow_samples} is more than {limits.max_samples_per_cell}"
+            )
         if quality.max_depth > limits.max_depth:
             raise OverLimit("quality.max_depth", f"{quality.max_depth} is more than {limits.max_depth}")
         if quality.map == "full":
@@ -313,5 +317,6 @@ def spent(request: FrameRequest, cost: FrameCost) -> dict[str, object]:
         "cells_reused": cost.cells_reused,
         "rays": asdict(cost.rays),
         "effects": list(cost.effects),
+        "effect_reasons": dict(zip(cost.effects, cost.effect_reasons, strict=True)),
         "error": {"rms": cost.rms_error, "foveal_rms": cost.foveal_rms_error},
     }

@@ -14,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from renderer.acuity import MAX_MARGIN_DEG, MAX_SCALE, Acuity
 from renderer.camera import MAX_POSITION_M, Camera
 from renderer.display import MAX_LENGTH_CM, MAX_SIDE_PX, Display
+from renderer.effect_choice import EFFECTS, read_effect_choice
 from renderer.frame import FrameRequest
 from renderer.gaze import MAX_GAZE_PX, Gaze
 from renderer.quality import MAX_BUCKET_PX, MAX_DEADLINE_MS, MAX_DEPTH, MAX_SAMPLES, Quality
@@ -44,7 +45,12 @@ BucketPx = Annotated[
 ]
 Samples = Annotated[int, Field(ge=1, le=MAX_SAMPLES, description="camera rays a cell")]
 Antialiasing = Annotated[Literal["stochastic", "regular"], Field(description="where in a cell they go")]
+ShadowSamples = Annotated[
+    int, Field(ge=1, le=MAX_SAMPLES, description="shadow rays a cell sends to each light with a size")
+]
 Depth = Annotated[int, Field(ge=0, le=MAX_DEPTH, description="mirrors and boundaries a ray may meet")]
+FORCED = "effects forced on or off whatever the scene calls for: +soft_shadows, -reflection"
+Effects = Annotated[list[Annotated[str, Field(max_length=40)]], Field(max_length=len(EFFECTS), description=FORCED)]
 Reconstruction = Annotated[
     Literal["nearest", "smooth"],
     Field(description="how cells become pixels: each its cell's colour, or cells blended into their neighbours"),
@@ -146,15 +152,17 @@ class QualityBody(_Body):
     gaze_bucket_px: BucketPx = QUALITY.gaze_bucket_px
     samples_per_cell: Samples = QUALITY.samples_per_cell
     antialiasing: Antialiasing = "stochastic"
+    shadow_samples: ShadowSamples = QUALITY.shadow_samples
     max_depth: Depth = QUALITY.max_depth
+    effects: Effects = []
     acuity: AcuityBody = AcuityBody()
     reconstruction: Reconstruction = "nearest"
     deadline_ms: DeadlineMs | None = None
 
     def record(self) -> Quality:
         """The renderer's record."""
-        stated = self.model_dump(exclude={"acuity"})
-        return Quality(acuity=self.acuity.record(), **stated)
+        stated = self.model_dump(exclude={"acuity", "effects"})
+        return Quality(acuity=self.acuity.record(), effects=tuple(self.effects), **stated)
 
 
 class _ViewBody(_Body):
@@ -278,7 +286,9 @@ class FrameQuery(CellQuery):
     """A frame of the scene's own view, as query parameters."""
 
     antialiasing: Antialiasing = "stochastic"
+    shadow_samples: ShadowSamples = QUALITY.shadow_samples
     max_depth: Depth = QUALITY.max_depth
+    effects: Annotated[str, Field(max_length=200, description=f"{FORCED}, with commas between")] = ""
     reconstruction: Reconstruction = "nearest"
     deadline_ms: DeadlineMs | None = None
     format: Format = "png"
@@ -289,7 +299,9 @@ class FrameQuery(CellQuery):
         return replace(
             CellQuery.quality(self),
             antialiasing=self.antialiasing,
+            shadow_samples=self.shadow_samples,
             max_depth=self.max_depth,
+            effects=read_effect_choice(self.effects),
             reconstruction=self.reconstruction,
             deadline_ms=self.deadline_ms,
         )

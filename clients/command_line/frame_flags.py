@@ -10,6 +10,7 @@ from clients.command_line.errors import blame_flag
 from renderer.acuity import ECCENTRICITIES, MODELS, Acuity
 from renderer.camera import Camera
 from renderer.display import Display
+from renderer.effect_choice import EFFECTS, read_effect_choice
 from renderer.errors import SettingsError
 from renderer.frame import FrameRequest
 from renderer.gaze import Gaze
@@ -30,7 +31,9 @@ FLAG_OF_FIELD = {
     "quality.gaze_bucket_px": "--bucket",
     "quality.samples_per_cell": "--samples",
     "quality.antialiasing": "--antialiasing",
+    "quality.shadow_samples": "--shadow-samples",
     "quality.max_depth": "--max-depth",
+    "quality.effects": "--effects",
     "quality.reconstruction": "--reconstruction",
     "quality.deadline_ms": "--deadline-ms",
     "quality.acuity.model": "--acuity-model",
@@ -110,6 +113,7 @@ def _add_quality_flags(detail: argparse._ArgumentGroup, samples: int) -> None:
     )
     numbers: tuple[tuple[str, type, int | float, str, str], ...] = (
         ("--samples", int, samples, "N", "camera rays a cell"),
+        ("--shadow-samples", int, default.shadow_samples, "N", "shadow rays a cell sends to each light with a size"),
         ("--max-depth", int, default.max_depth, "N", "mirrors and glass boundaries a ray may meet"),
         ("--bucket", int, default.gaze_bucket_px, "PX", "side of the squares of gaze that share a map; 0: none"),
         ("--margin-deg", float, default.acuity.margin_deg, "DEG", "error of the eye tracker to allow for"),
@@ -133,6 +137,14 @@ def _add_quality_flags(detail: argparse._ArgumentGroup, samples: int) -> None:
         detail.add_argument(
             flag, default=name, metavar=metavar, help=f"{text}: {', '.join(names)} (default %(default)s)"
         )
+
+    detail.add_argument(
+        "--effects",
+        default="",
+        metavar="+ON,-OFF",
+        help="force effects on or off to see what they cost, as --effects=+soft_shadows,-reflection; "
+        f"there are {', '.join(EFFECTS)} (default: what the scene calls for)",
+    )
 
 
 def frame_request(arguments: argparse.Namespace, scene_camera: Camera, *, linear: bool = False) -> FrameRequest:
@@ -177,7 +189,9 @@ def quality_of(arguments: argparse.Namespace) -> Quality:
         gaze_bucket_px=arguments.bucket,
         samples_per_cell=arguments.samples,
         antialiasing=arguments.antialiasing,
+        shadow_samples=arguments.shadow_samples,
         max_depth=arguments.max_depth,
+        effects=read_effect_choice(arguments.effects),
         acuity=acuity,
         reconstruction=arguments.reconstruction,
         deadline_ms=arguments.deadline_ms,

@@ -226,6 +226,7 @@ def cost_record(frame: Frame, request: FrameRequest, extra_ms: dict[str, float])
             "refraction": rays.refraction,
         },
         "effects": list(cost.effects),
+        "effect_reasons": dict(zip(cost.effects, cost.effect_reasons, strict=True)),
         "error": {"rms": cost.rms_error, "foveal_rms": cost.foveal_rms_error},
         "rejected_samples": cost.rejected_samples,
         "timing_ms": {stage: round(ms, 3) for stage, ms in times.items()},

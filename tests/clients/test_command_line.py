@@ -120,6 +120,8 @@ def test_help_imports_nothing_slow() -> None:
         ((*RENDER, "--samples", "0"), "--samples: expected an integer from 1 to 4096, found 0"),
         ((*RENDER, "--samples", "many"), "--samples: invalid int value: 'many'"),
         ((*RENDER, "--max-depth", "-1"), "--max-depth: expected an integer from 0 to 64"),
+        ((*RENDER, "--shadow-samples", "0"), "--shadow-samples: expected an integer from 1 to 4096, found 0"),
+        ((*RENDER, "--effects", "+fog"), "--effects: expected effects out of textures, specular, shadows"),
         ((*RENDER, "--bucket", "9999"), "--bucket: expected an integer from 0 to 512"),
         ((*RENDER, "--map", "hexagonal"), "--map: expected one of aligned, scanline, full"),
         ((*RENDER, "--antialiasing", "x"), "--antialiasing: expected one of stochastic"),
@@ -259,6 +261,8 @@ def test_each_flag_reaches_the_frame(capsys: pytest.CaptureFixture[str], tmp_pat
     assert (hurried["deadline_met"], hurried["samples_per_cell"], hurried["acuity_scale"]) == (False, 1, 64)
     assert (plain["deadline_ms"], plain["deadline_met"]) == (None, None)
     assert cost("--max-depth", "0")["rays"]["reflection"] == 0 < plain["rays"]["reflection"]
+    assert cost("--effects=+textures,-reflection")["rays"]["reflection"] == 0
+    assert cost("--effects=+textures,-reflection")["effect_reasons"]["textures"].startswith("2 triangles of")
     assert cost("--acuity-scale", "16")["cells"] < plain["cells"]
     assert cost("--screen-cm", "3")["cells"] < plain["cells"]
     assert cost("--screen-cm", "5x2")["picture"] != plain["picture"]

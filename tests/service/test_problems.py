@@ -170,6 +170,7 @@ def test_unknown_paths_and_methods(client: httpx.Client) -> None:
     [
         ({"display": {"width_px": 201, "height_px": 100}}, "display"),
         ({"quality": {"samples_per_cell": 9}}, "quality.samples_per_cell"),
+        ({"quality": {"shadow_samples": 9}}, "quality.shadow_samples"),
         ({"quality": {"max_depth": 4}}, "quality.max_depth"),
         ({"display": {"width_px": 200, "height_px": 100}, "quality": {"map": "full", "samples_per_cell": 8}},
          "quality.samples_per_cell"),
