@@ -13,7 +13,7 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus, WebSocketException
 from websockets.typing import Subprotocol
 
-from clients.bridge.backoff import Backoff
+from clients.backoff import Backoff
 from service import protocol
 
 MOST_FRAME_BYTES: Final = 1 << 30
@@ -94,7 +94,7 @@ async def stay_connected(
         except (OSError, WebSocketException) as error:
             why = str(error) or type(error).__name__
         if heard_s() > began_s:
-            backoff = Backoff(random.random)
+            backoff.restart()
         if time.monotonic() - heard_s() > patience_s:
             raise ServiceGone(f"{url}: no service for {patience_s:g} s: {why}")
         await asyncio.sleep(backoff.wait_s())

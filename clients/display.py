@@ -31,9 +31,9 @@ from numpy.typing import NDArray
 from websockets.asyncio.client import ClientConnection
 from websockets.exceptions import ConnectionClosed
 
-from clients.bridge.clock import ServiceClock
 from clients.connection import ServiceRefused, stay_connected, stream_url
 from clients.decoding import decode_image
+from clients.service_clock import ServiceClock
 from service import protocol
 from service.protocol import FrameHeader
 

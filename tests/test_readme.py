@@ -185,6 +185,16 @@ def test_each_request_is_answered_with_a_picture(words: list[str], address: str)
     assert cost["map"]["cells"] > 0
 
 
+def test_the_program_shows_frames(address: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """As it stands, but for a smaller screen."""
+    (program,) = blocks(README, "python")
+    small = program.replace("http://127.0.0.1:8321", address).replace("1920", "64").replace("1080", "36")
+    exec(compile(small, "README.md", "exec"), {})
+    lines = capsys.readouterr().out.splitlines()
+    assert re.fullmatch(r"moving [\d.]+ \(36, 64, 3\)", lines[0])
+    assert lines[-1].startswith("final ")
+
+
 def test_each_route_of_the_table_exists(address: str) -> None:
     paths = {"/", "/docs", *httpx.get(f"{address}/openapi.json", timeout=PATIENCE_S).json()["paths"]}
     named = set(re.findall(r"`(?:GET |POST )?(/[\w/{}]*)`", "".join(row[0] for row in table("Ask for a frame"))))
