@@ -1,10 +1,10 @@
-"""Mesh files: OBJ with MTL, glTF and GLB, PLY, STL, 3DS. The only file that knows trimesh.
+"""Mesh files: OBJ with MTL, glTF and GLB, PLY, STL, 3DS, COLLADA. The only file that knows trimesh.
 
-trimesh reads STL. The others have readers of their own (`obj_file`, `gltf_file`, `ply_file`, `three_ds_file`),
-because trimesh 5.2 knows no 3DS, and reads some of the others' files as something else without saying so. In
-OBJ: index 0, relative indices before the last vertex, texture coordinates or normals on some faces only, concave
-polygons, a byte-order mark, a last line cut short. In glTF: normalised texture coordinates, sparse accessors. In
-PLY: text cut short; and binary polygons of unlike sizes it refuses.
+trimesh reads STL. The others have readers of their own (`obj_file`, `gltf_file`, `ply_file`, `three_ds_file`,
+`collada_file`), because trimesh 5.2 knows no 3DS, and reads some of the others' files as something else without
+saying so. In OBJ: index 0, relative indices before the last vertex, texture coordinates or normals on some faces
+only, concave polygons, a byte-order mark, a last line cut short. In glTF: normalised texture coordinates, sparse
+accessors. In PLY: text cut short; and binary polygons of unlike sizes it refuses.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from typing import Final
 
 import numpy as np
 
+from renderer.collada_file import read_collada
 from renderer.errors import SceneError
 from renderer.folder import MAX_FILE_BYTES, Folder
 from renderer.framing import DEFAULT_MATERIAL
@@ -30,7 +31,7 @@ from renderer.three_ds_file import read_three_ds
 # trimesh logs what it cannot read, traceback and all; it is said once, in our own error.
 logging.getLogger("trimesh").addHandler(logging.NullHandler())
 
-SUFFIXES: Final = (".obj", ".glb", ".gltf", ".ply", ".stl", ".3ds")
+SUFFIXES: Final = (".obj", ".glb", ".gltf", ".ply", ".stl", ".3ds", ".dae")
 """File name endings of mesh files, in lower case."""
 
 MAX_TRIANGLES: Final = 20_000_000
@@ -96,6 +97,8 @@ def _read(folder: Folder, data: bytes, inner: str, suffix: str, max_triangles: i
             return Model((read_ply(data, folder.file_label(inner), max_triangles),))
         case ".stl":
             return Model((_read_stl(data, folder.file_label(inner)),))
+        case ".dae":
+            return read_collada(folder, data, inner, max_triangles)
         case ".3ds":
             return read_three_ds(folder, data, inner, max_triangles)
         case _:

@@ -159,3 +159,44 @@ def three_ds(*content: bytes) -> bytes:
 
 def three_ds_object(name: str, *content: bytes) -> bytes:
     return chunk(0x4000, name.encode() + b"\0", *content)
+
+
+def dae_source(name: str, values: Sequence[float], stride: int) -> str:
+    """A source of a COLLADA geometry."""
+    numbers = " ".join(map(str, values))
+    return (
+        f'<source id="{name}"><float_array id="{name}-a" count="{len(values)}">{numbers}</float_array>'
+        f'<technique_common><accessor source="#{name}-a" count="{len(values) // stride}" stride="{stride}"/>'
+        "</technique_common></source>"
+    )
+
+
+DAE_SQUARE = (
+    dae_source("square", (0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0), 3)
+    + '<vertices id="corners"><input semantic="POSITION" source="#square"/></vertices>'
+)
+"""Sources of the unit square in the plane z = 0."""
+
+DAE_TRIANGLES = (
+    '<triangles count="2" material="look"><input semantic="VERTEX" source="#corners" offset="0"/>'
+    "<p>0 1 2 0 2 3</p></triangles>"
+)
+
+
+def dae(
+    primitives: str = DAE_TRIANGLES,
+    *,
+    sources: str = DAE_SQUARE,
+    asset: str = "<up_axis>Y_UP</up_axis>",
+    nodes: str = '<node><instance_geometry url="#g"/></node>',
+    libraries: str = "",
+) -> str:
+    """A COLLADA file with one geometry `g`, and nodes that show it."""
+    return (
+        '<?xml version="1.0" encoding="utf-8"?>'
+        '<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">\n'
+        f"<asset>{asset}</asset>\n{libraries}\n"
+        f'<library_geometries><geometry id="g" name="square"><mesh>\n{sources}\n{primitives}\n</mesh></geometry>'
+        f'</library_geometries>\n<library_visual_scenes><visual_scene id="s">\n{nodes}\n</visual_scene>'
+        '</library_visual_scenes>\n<scene><instance_visual_scene url="#s"/></scene></COLLADA>\n'
+    )

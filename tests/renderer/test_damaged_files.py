@@ -20,8 +20,10 @@ from renderer.mesh_file import load_model
 from renderer.model import Model
 from tests.renderer.model_files import (
     COLOURED,
+    DAE_TRIANGLES,
     SQUARE,
     chunk,
+    dae,
     glb,
     gltf,
     ply,
@@ -64,6 +66,7 @@ def good_files() -> dict[str, bytes]:
         "big.ply": ply("binary_big_endian", [[0, 1, 2], [0, 2, 3]], COLOURED),
         "binary.stl": trimesh.exchange.stl.export_stl(box),
         "a.3ds": a_3ds(),
+        "a.dae": a_dae().encode(),
         "text.stl": trimesh.exchange.stl.export_stl_ascii(box).encode(),
     }
 
@@ -81,6 +84,36 @@ def a_3ds() -> bytes:
         three_ds_object("Eye", chunk(0x4700, struct.pack("<8f", 0, -5, 1, 0, 0, 1, 0, 40))),
         three_ds_object("Box", three_ds_cube(uvs, matrix, in_faces=of_faces)),
     )
+
+
+def a_dae() -> str:
+    """A square with everything that is read of a COLLADA file."""
+    libraries = (
+        '<library_images><image id="i"><init_from>t.png</init_from></image></library_images><library_effects>'
+        '<effect id="e"><profile_COMMON><newparam sid="f"><surface><init_from>i</init_from></surface></newparam>'
+        '<newparam sid="p"><sampler2D><source>f</source></sampler2D></newparam><technique><phong>'
+        '<diffuse><texture texture="p" texcoord="UV"/></diffuse><specular><color>1 1 1 1</color></specular>'
+        "<shininess><float>9</float></shininess><transparency><float>0.5</float></transparency></phong>"
+        '</technique></profile_COMMON></effect></library_effects><library_materials><material id="look">'
+        '<instance_effect url="#e"/></material></library_materials><library_lights><light id="l"><technique_common>'
+        "<point><color>1 1 1</color><quadratic_attenuation>1</quadratic_attenuation></point></technique_common>"
+        '</light></library_lights><library_cameras><camera id="c"><optics><technique_common><perspective>'
+        "<xfov>50</xfov></perspective></technique_common></optics></camera></library_cameras>"
+        '<library_controllers><controller id="k"><skin source="#g"><bind_shape_matrix>1 0 0 5 0 1 0 0 0 0 1 0 0 0 0 1'
+        "</bind_shape_matrix></skin></controller></library_controllers>"
+    )
+    nodes = (
+        '<node><lookat>0 0 5 0 0 0 0 1 0</lookat><instance_camera url="#c"/><instance_light url="#l"/></node>'
+        '<node id="n"><rotate>0 0 1 30</rotate><scale>2 3 4</scale><instance_geometry url="#g"/></node>'
+        '<node><translate>1 2 3</translate><instance_node url="#n"/><instance_controller url="#k"/></node>'
+    )
+    vertex = '<input semantic="VERTEX" source="#corners" offset="0"/>'
+    primitives = (
+        f"{DAE_TRIANGLES}<polylist>{vertex}<vcount>4 3</vcount><p>0 1 2 3 0 1 2</p></polylist>"
+        f"<polygons>{vertex}<p>0 1 2 3</p></polygons><tristrips>{vertex}<p>0 1 3 2</p></tristrips>"
+        f"<trifans>{vertex}<p>0 1 2 3</p></trifans>"
+    )
+    return dae(primitives, asset='<unit meter="0.5"/><up_axis>Z_UP</up_axis>', nodes=nodes, libraries=libraries)
 
 
 def damaged(good: bytes, generator: np.random.Generator) -> Iterator[bytes]:
