@@ -50,7 +50,7 @@ transmission = [1.0, 1.0, 1.0]
 ior = 1.5
 
 [[mesh]]
-file = "vase.obj"                  # OBJ, GLB, glTF, PLY, STL or 3DS
+file = "vase.obj"                  # OBJ, GLB, glTF, PLY, STL, COLLADA or 3DS
 material = "gold"                  # or the file's own; { Lid = "wood" } replaces only its material Lid
 use_camera = false                 # or false; true: the scene is seen by the file's camera, in place of [camera]
 use_lights = false                 # or false; true: the file's lights, beside those of [[light]]

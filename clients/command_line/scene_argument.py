@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -43,7 +44,8 @@ def open_library(folder: Path | None) -> SceneLibrary:
 
 
 def load_scene(text: str, folder: Path | None) -> PreparedScene:
-    """The scene that `text` names; a name of the library comes before a path.
+    """The scene that `text` names; a name of the library comes before a path. Says what a mesh file holds that
+    is not shown.
 
     Raises:
         UnknownScene: if it is neither a name nor a path that exists.
@@ -66,4 +68,8 @@ def load_scene(text: str, folder: Path | None) -> PreparedScene:
 
         if path.is_dir():
             return prepare(load_scene_folder(path))
-        return prepare(frame_model(load_model(path), path.stem))
+        model = load_model(path)
+        prepared = prepare(frame_model(model, path.stem))
+    for note in model.notes:
+        print(f"gazetrace: note: {path}: {note}", file=sys.stderr)
+    return prepared

@@ -10,6 +10,7 @@ import re
 import select
 import shlex
 import signal
+import struct
 import subprocess
 import sys
 import threading
@@ -30,6 +31,7 @@ from clients.command_line.serve import flag_of, setting_texts, settings_of
 from renderer.codec import decode_texture
 from service.settings import Settings
 from tests.clients.commands import PATIENCE_S, failing, start
+from tests.renderer.model_files import chunk, three_ds, three_ds_cube, three_ds_object
 
 pytestmark = pytest.mark.usefixtures("plain_environment")
 
@@ -343,6 +345,19 @@ def test_a_bare_mesh_is_framed_and_lit(capsys: pytest.CaptureFixture[str], tmp_p
     middle = picture[27, 48]
     assert 20 < middle.mean() < 250, "lit, and not burnt out"
     assert np.abs(middle - picture[2, 2]).sum() > 20, "the cube stands out from what is around it"
+
+
+def test_a_mesh_files_own_camera_and_light_are_used(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    spot = chunk(0x4600, struct.pack("<3f", 0.5, -9, 0.5), chunk(0x4610, struct.pack("<5f", 0.5, 0, 0.5, 30, 40)))
+    behind = struct.pack("<8f", 0.5, 5, 0.5, 0.5, 0, 0.5, 0, 48)
+    for name, camera in (("front", struct.pack("<8f", 0.5, -5, 0.5, 0.5, 0, 0.5, 0, 48)), ("back", behind)):
+        content = (("Lamp", spot), ("Eye", chunk(0x4700, camera)), ("Box", three_ds_cube()))
+        (tmp_path / f"{name}.3ds").write_bytes(three_ds(*(three_ds_object(*each) for each in content)))
+        assert main(["render", f"{name}.3ds", *SMALL, "--full", "-o", f"{name}.png"]) == 0
+        note = f"gazetrace: note: {name}.3ds: a spot light is shown as one that lights to all sides\n"
+        assert capsys.readouterr().err == note
+    lit, dark = (pixels_of(tmp_path / f"{name}.png")[27, 48].mean() for name in ("front", "back"))
+    assert lit > 1.5 * dark, "the lamp stands on the side that the first camera sees"
 
 
 def test_a_scene_folder_is_a_scene_by_path_and_by_name(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
