@@ -7,9 +7,10 @@ millimetres, x to the left, z into the box; reflectances here are its spectra as
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from renderer.camera import Camera
-from renderer.scene import Material, PointLight, Rgb, Scene, Surroundings
+from renderer.scene import Material, RectangleLight, Rgb, Scene, Surroundings
 from renderer.shapes import Shape, join, surface
 
 Corner = tuple[float, float, float]
@@ -30,17 +31,16 @@ TALL_BLOCK_TOP = ((423.0, 330.0, 247.0), (265.0, 330.0, 296.0), (314.0, 330.0, 4
 WHITE = Material("white", (0.725, 0.71, 0.68))
 RED = Material("red", (0.63, 0.065, 0.05))
 GREEN = Material("green", (0.14, 0.45, 0.091))
-LAMP = Material("lamp", (0.78, 0.78, 0.78), emission=(18.4, 15.2, 10.6))
 
-LAMP_INTENSITY: Rgb = (0.251, 0.207, 0.145)
-"""Of the point light that stands for the lamp: its radiance times its 0.13 m x 0.105 m [W/sr]."""
+LAMP_RADIANCE: Rgb = (18.4, 15.2, 10.6)
+"""Of the lamp [W/(sr m^2)]: its published spectrum as linear Rec.709."""
 
-BOUNCE_INTENSITY: Rgb = (0.026, 0.022, 0.017)
-"""Of a second one low in the opening, for the light that comes back from floor and walls [W/sr]."""
+AMBIENT: Rgb = (0.085, 0.073, 0.062)
+"""For the light that comes back from floor and walls, which is not simulated."""
 
 
 def cornell() -> Scene:
-    """The scene: box, two blocks, the lamp and a point light just below it."""
+    """The scene: box, two blocks, and the lamp in the ceiling."""
     white = join(_polygon(FLOOR), _ceiling(), _polygon(BACK_WALL))
     blocks = join(_block(SHORT_BLOCK_TOP), _block(TALL_BLOCK_TOP))
     return Scene(
@@ -49,17 +49,24 @@ def cornell() -> Scene:
             _polygon(LEFT_WALL).mesh(RED, name="left wall"),
             _polygon(RIGHT_WALL).mesh(GREEN, name="right wall"),
             blocks.mesh(WHITE, name="blocks"),
-            _polygon(LIGHT).mesh(LAMP, name="lamp"),
         ),
-        lights=(
-            PointLight((0.278, 0.5465, 0.2795), LAMP_INTENSITY),
-            PointLight((0.278, 0.210, -0.060), BOUNCE_INTENSITY, casts_shadows=False),
-        ),
-        surroundings=Surroundings(ambient=(0.050, 0.043, 0.036)),
+        lights=(_lamp(),),
+        surroundings=Surroundings(ambient=AMBIENT),
         camera=Camera(position=(0.278, 0.273, -0.800), look_at=(0.278, 0.273, 0.0), vertical_fov_deg=39.3),
-        exposure=1.5,
+        exposure=2.3,
         title="Cornell box, by its published numbers",
     )
+
+
+def _lamp() -> RectangleLight:
+    """The lamp, which shines down."""
+    corner, along, _, across = (np.array(point) * METRES for point in LIGHT)
+    return RectangleLight(_point(corner), _point(along - corner), _point(across - corner), LAMP_RADIANCE)
+
+
+def _point(vector: NDArray[np.float64]) -> Corner:
+    x, y, z = vector.tolist()
+    return x, y, z
 
 
 def _ceiling() -> Shape:

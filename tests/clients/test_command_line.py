@@ -323,6 +323,17 @@ def test_a_file_that_cannot_take_its_name_leaves_nothing_behind(tmp_path: Path) 
     assert [path.name for path in tmp_path.iterdir()] == ["taken"]
 
 
+def test_shadow_samples_are_sent_to_a_light_with_a_size(capsys: pytest.CaptureFixture[str]) -> None:
+    rays = []
+    for number in ("2", "8"):
+        assert (
+            main(["render", "cornell", *SMALL, "--samples", "2", "--shadow-samples", number, "--json", "-o", "a.png"])
+            == 0
+        )
+        rays.append(json.loads(capsys.readouterr().out)["rays"]["shadow"])
+    assert 3 * rays[0] < rays[1] < 5 * rays[0]
+
+
 def test_a_finished_command_leaves_no_thread_behind() -> None:
     assert main(["render", "matte", *SMALL, "-o", "a.png"]) == 0
     assert main(["bench", "matte", *SMALL, "--repeats", "1"]) == 0

@@ -17,7 +17,7 @@ from renderer.gaze import Gaze
 from renderer.pipeline import Renderer
 from renderer.prepared import prepare
 from renderer.quality import Quality
-from renderer.scene import BLACK, Material, Scene
+from renderer.scene import BLACK, Material, RectangleLight, Scene
 from renderer.scenes import BUILT_IN
 
 IDS = ("spheres", "cornell", "atrium", "gallery", "matte")
@@ -135,9 +135,12 @@ def test_cornell_has_the_published_corners_in_metres(scene_of: SceneOf) -> None:
     tall = [(0.423, 0.247), (0.265, 0.296), (0.314, 0.456), (0.472, 0.406)]
     corners = {(x, y, z) for top, block in ((0.165, short), (0.33, tall)) for x, z in block for y in (0.0, top)}
     assert {tuple(float(part) for part in np.round(vertex, 6)) for vertex in blocks} == corners
-    lamp = by_name["lamp"]
-    np.testing.assert_allclose(np.ptp(lamp.vertices, axis=0), (0.130, 0.0, 0.105), atol=1e-12)
-    assert lamp.material.emission != BLACK
+    (lamp,) = scene.lights
+    assert isinstance(lamp, RectangleLight)
+    np.testing.assert_allclose(lamp.corner, (0.343, 0.5488, 0.227))
+    np.testing.assert_allclose(np.add(lamp.edge_u, lamp.edge_v), (-0.130, 0.0, 0.105), atol=1e-12)
+    assert np.cross(lamp.edge_u, lamp.edge_v)[1] < 0.0
+    assert plan_effects(scene).names == ("soft_shadows",)
     red, green = by_name["left wall"].material.diffuse, by_name["right wall"].material.diffuse
     assert red[0] > 5 * red[1]
     assert green[1] > 2 * green[0]
