@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from renderer.camera import Camera
 from renderer.collada_geometry import PRIMITIVES, read_primitive
-from renderer.collada_material import ColladaMaterial, read_effect
+from renderer.collada_material import ColladaMaterial, mistakes_opacity, read_effect
 from renderer.collada_view import parent_from_node, read_camera, read_color, read_light, world_from_file
 from renderer.errors import SceneError, SettingsError
 from renderer.folder import Folder, percent_decoded
@@ -73,12 +73,14 @@ class _Reader:
     ambient: Rgb = BLACK
     camera: Camera | None = None
     triangles: int = 0
+    mistaken: bool = False
 
     def model(self) -> Model:
         """What the scene shows, or without a scene all geometry as it stands."""
         for element in self.root.descendants():
             if "id" in element.attributes:
                 self.ids.setdefault(element.attributes["id"].strip(), element)
+        self.mistaken = mistakes_opacity(self._library("library_effects", "effect"))
         scene = self._scene()
         if scene is not None:
             for node, world_from_node in self._nodes(scene):
@@ -202,7 +204,8 @@ class _Reader:
             if material is not None and instance is not None:
                 effect = self._target(instance)
                 if effect is not None:
-                    look = read_effect(effect, material.attributes.get("name", name), self.ids, self.textures)
+                    title = material.attributes.get("name", name)
+                    look = read_effect(effect, title, self.ids, self.textures, self.mistaken)
             self.materials[name] = look
         return self.materials[name]
 

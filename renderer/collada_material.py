@@ -12,8 +12,9 @@
 | constant | emission, no diffuse |
 
 What is let through is taken from the diffuse. Opacity is the alpha of `transparent` times `transparency` (A_ONE,
-the default), 1 minus that (A_ZERO), or the same of each colour (RGB_ONE, RGB_ZERO). An opacity of 0 is taken for
-the mistake of an exporter and counts as 1. Transparent textures are left out.
+the default), 1 minus that (A_ZERO), or the same of each colour (RGB_ONE, RGB_ZERO). A file in which some surface
+has an opacity of 0 was written by an exporter that took opacity for its opposite: there all count as 1 minus what
+is stated. Transparent textures are left out.
 
 Source: Khronos, COLLADA 1.4.1 specification, chapter 8, and 1.5.0, chapter 8, "Determining transparency".
 """
@@ -21,6 +22,7 @@ Source: Khronos, COLLADA 1.4.1 specification, chapter 8, and 1.5.0, chapter 8, "
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final
 
@@ -54,7 +56,20 @@ class ColladaMaterial:
     texcoord: str = ""
 
 
-def read_effect(effect: Element, name: str, images: dict[str, Element], textures: TextureSearch) -> ColladaMaterial:
+def mistakes_opacity(effects: Iterable[Element]) -> bool:
+    """Whether some surface of a file would be invisible: its exporter wrote what is let through as opacity.
+
+    Raises:
+        SceneError: naming the file, the line and the element.
+    """
+    return any(
+        max(_opacity(found)) == 0.0 for effect in effects for found in effect.descendants() if found.tag in SHADERS
+    )
+
+
+def read_effect(
+    effect: Element, name: str, images: dict[str, Element], textures: TextureSearch, mistaken: bool
+) -> ColladaMaterial:
     """The material that an effect describes.
 
     Args:
@@ -62,6 +77,7 @@ def read_effect(effect: Element, name: str, images: dict[str, Element], textures
         name: for messages.
         images: the file's elements by id.
         textures: finds its textures.
+        mistaken: whether the file `mistakes_opacity`.
 
     Raises:
         SceneError: naming the file, the line and the element.
@@ -75,7 +91,8 @@ def read_effect(effect: Element, name: str, images: dict[str, Element], textures
     diffuse = _color(shader, "diffuse", _GREY if shader.tag != "constant" else (0.0, 0.0, 0.0, 1.0))[:3]
     if texture is not None:
         diffuse = _WHITE
-    clear = _clear(shader)
+    opacity = _opacity(shader)
+    clear = opacity if mistaken and _states_opacity(shader) else (1.0 - opacity[0], 1.0 - opacity[1], 1.0 - opacity[2])
     shiny = shader.tag in ("phong", "blinn")
     ior = shader.number("index_of_refraction/float", 1.0)
     mirror = _color(shader, "reflective", (0.0, 0.0, 0.0, 1.0))[:3]
@@ -120,21 +137,20 @@ def _texture(
     return textures.load(percent_decoded(written))
 
 
-def _clear(shader: Element) -> Rgb:
-    """Share let through."""
-    transparent, transparency = shader.first("transparent"), shader.first("transparency")
-    if transparent is None and transparency is None:
-        return BLACK
+def _states_opacity(shader: Element) -> bool:
+    return any(True for _ in shader.all("transparent", "transparency"))
+
+
+def _opacity(shader: Element) -> Rgb:
+    """Share held back, as the file states it; 1 where it states none."""
+    if not _states_opacity(shader):
+        return _WHITE
+    transparent = shader.first("transparent")
     mode = "A_ONE" if transparent is None else transparent.attributes.get("opaque", "A_ONE")
     red, green, blue, alpha = _color(shader, "transparent", (1.0, 1.0, 1.0, 1.0))
     amount = _share(shader, "transparency", 1.0)
     parts = (red, green, blue) if mode.startswith("RGB") else (alpha, alpha, alpha)
-    opacity = [min(part, 1.0) * amount for part in parts]
-    if mode.endswith("_ZERO"):
-        opacity = [1.0 - part for part in opacity]
-    if max(opacity) == 0.0:
-        return BLACK
-    r, g, b = (1.0 - part for part in opacity)
+    r, g, b = (1.0 - part * amount if mode.endswith("_ZERO") else part * amount for part in parts)
     return r, g, b
 
 

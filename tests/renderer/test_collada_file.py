@@ -258,6 +258,19 @@ def test_materials(tmp_path: Path, shader: str, expected: dict[str, object]) -> 
         np.testing.assert_allclose(getattr(found, name), value, atol=1e-12, err_msg=name)
 
 
+def test_an_exporter_that_takes_opacity_for_its_opposite_is_found_out(tmp_path: Path) -> None:
+    stated = "<phong>{}<transparency><float>{}</float></transparency></phong>"
+    effect = '<effect id="o"><profile_COMMON><technique>{}</technique></profile_COMMON></effect>'
+    other = f"<library_effects>{effect}</library_effects>"
+    shader = stated.format(KD, 0.2)
+    for opacity, expected in ((0.0, 0.2), (0.5, 0.8)):
+        text = looked(f"<technique>{shader}</technique>", extra=other.format(stated.format("", opacity)))
+        (mesh,) = read(tmp_path, text).meshes
+        np.testing.assert_allclose(mesh.material.transmission, [expected] * 3)
+    hidden = looked(f"<technique><lambert>{KD}</lambert></technique>", extra=other.format(stated.format("", 0)))
+    assert read(tmp_path, hidden).meshes[0].material.transmission == NONE
+
+
 @pytest.mark.parametrize("path", ["wood%20grain.png", "file:///C:/Textures/WOOD GRAIN.png", "..\\x\\wood grain.PNG"])
 def test_textures_by_way_of_sampler_and_surface(tmp_path: Path, path: str) -> None:
     (tmp_path / "wood grain.png").write_bytes(png((10, 20, 30)))
