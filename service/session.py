@@ -176,6 +176,8 @@ class Session:
         order = body.order()
         prepared = await self._stage.prepare(order)
         self._accepted.append(Configuration(number, body, prepared, order))
+        if body.gaze is not None:
+            self.look([protocol.Gaze(**body.gaze.model_dump())])
         self._wake.set()
 
     # What clients are told
@@ -242,8 +244,6 @@ class Session:
             for viewer in self.viewers:
                 viewer.withdraw()
             self.configuration, self._latest, self._asked_ns = accepted, None, self._clock()
-            if accepted.body.gaze is not None:
-                self.look([protocol.Gaze(**accepted.body.gaze.model_dump())])
             self._tell(self.ready())
         self._accepted.clear()
 
