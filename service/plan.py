@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from renderer.frame import FrameRequest
+from renderer.frame import FrameCost, FrameRequest
 from renderer.gaze import Gaze, GazeBucket
 from renderer.prepared import PreparedScene
 from renderer.quality import Quality
@@ -12,6 +12,9 @@ from service.conditioning import Attention, slack_deg, steady_bucket, within
 from service.protocol import FramePhase
 from service.rendering import Order
 from service.request import StreamBody, gaze_on
+
+DEADLINE_MS = 33.0
+"""Time for the first frame after a move, rendered and encoded, where the quality states none."""
 
 MOVING_QUALITY_DROP = 15
 """How much lower the quality of JPEG and WebP is while the gaze moves."""
@@ -68,14 +71,12 @@ class Step:
         request: what to render.
         phase: what to call it.
         format, image_quality: how to encode it.
-        last: whether it shows all samples there will be.
     """
 
     request: FrameRequest
     phase: FramePhase
     format: str
     image_quality: int
-    last: bool
 
 
 def gaze_px(configuration: Configuration, attention: Attention) -> Gaze | None:
@@ -107,27 +108,49 @@ def look_at(configuration: Configuration, attention: Attention, margin_deg: floa
     return Look(bucket, margin, attention.saccade)
 
 
-def step_of(configuration: Configuration, look: Look, attention: Attention, index: int) -> Step:
-    """The step number `index` of a look, from 0, up to the one that is `last`."""
+def steps_of(configuration: Configuration, look: Look) -> int:
+    """How many steps a look takes at most: a quick one, then 1, 2, 4, ... samples up to all of them."""
+    samples = configuration.order.request.quality.samples_per_cell
+    return 1 if look.saccade else 2 + (samples - 1).bit_length()
+
+
+def step_of(configuration: Configuration, look: Look, attention: Attention, index: int, encode_ms: float) -> Step:
+    """The step number `index` of a look, from 0.
+
+    The first has one sample a cell, and cells so coarse that it fits the deadline; those after it take the time
+    that they take.
+
+    Args:
+        configuration: in force.
+        look: what to show.
+        attention: of the eye.
+        index: of the step.
+        encode_ms: how long encoding will take, which the deadline has to leave room for [ms].
+    """
     order = configuration.order
     gaze = gaze_px(configuration, attention)
     if look.bucket is not None and gaze is not None:
         gaze = within(look.bucket, gaze)
-    quality = _quality(order.request.quality, look)
-    samples = min(2**index, quality.samples_per_cell)
-    request = replace(order.request, gaze=gaze or order.request.gaze, quality=quality, samples=samples)
-    last = look.saccade or samples == quality.samples_per_cell
-    phase: FramePhase = "moving" if index == 0 else "still"
-    if last and not look.saccade and order.format in UNCHANGED_FORMATS:
-        phase = "final"
-    drop = min(MOVING_QUALITY_DROP, max(0, order.image_quality - LOWEST_QUALITY)) if phase == "moving" else 0
-    return Step(request, phase, order.format, order.image_quality - drop, last)
+    quality, moving = _quality(order.request.quality, look), index == 0
+    stated_ms = DEADLINE_MS if quality.deadline_ms is None else quality.deadline_ms
+    deadline_ms = max(stated_ms - encode_ms, stated_ms / 2) if moving else None
+    request = replace(
+        order.request,
+        gaze=gaze or order.request.gaze,
+        quality=replace(quality, deadline_ms=deadline_ms),
+        samples=1 if moving else min(2 ** (index - 1), quality.samples_per_cell),
+    )
+    drop = min(MOVING_QUALITY_DROP, max(0, order.image_quality - LOWEST_QUALITY)) if moving else 0
+    return Step(request, "moving" if moving else "still", order.format, order.image_quality - drop)
 
 
-def steps_done(step: Step, mean_samples: float, before: int) -> int:
-    """How many steps are done after one more; all but the last where every sample was there already."""
-    most = step.request.quality.samples_per_cell
-    return max(before + 1, (most - 1).bit_length()) if mean_samples >= most else before + 1
+def steps_done(step: Step, cost: FrameCost, index: int, steps: int) -> int:
+    """How many of a look's steps need not be taken any more after number `index`."""
+    if cost.acuity_scale > step.request.quality.acuity.scale:
+        return index + 1
+    if cost.mean_samples >= step.request.quality.samples_per_cell:
+        return steps
+    return max(index + 1, 2)
 
 
 def _quality(quality: Quality, look: Look) -> Quality:

@@ -16,7 +16,7 @@ from renderer.frame import Abandoned
 from service import protocol
 from service.conditioning import Attention, elapse, next_change_ns, observe
 from service.outbox import Outbox
-from service.plan import Configuration, Look, Step, look_at, step_of, steps_done
+from service.plan import UNCHANGED_FORMATS, Configuration, Look, Step, look_at, step_of, steps_done, steps_of
 from service.protocol import CloseCode
 from service.refusal import refusal
 from service.rendering import NS_PER_MS, NotReady, Rendered
@@ -32,6 +32,9 @@ PATIENCE_NS = 250 * NS_PER_MS
 
 SETTLED_NS = 150 * NS_PER_MS
 """How long the gaze must have rested before the last frame is encoded without loss."""
+
+ENCODE_GAIN = 0.25
+"""Weight of the newest frame in the mean time that encoding takes."""
 
 TICK_S = 0.05
 """How often the time is looked at while it alone can change what to render [s]."""
@@ -58,7 +61,7 @@ class Progress:
         look: what it shows.
         since_ns: when it began [monotonic ns].
         taken: the newest step.
-        steps: how many there were.
+        steps: how many are done.
         lossless: the last frame, on its way.
         over: whether there is nothing left to do.
     """
@@ -95,6 +98,7 @@ class Session:
         self._latest: Shown | None = None
         self._gaze_waits = False
         self._asked_ns = 0
+        self._encode_ms = 0.0
         self._status_ns = 0
         self._refusal: protocol.Error | None = None
         self._wake = asyncio.Event()
@@ -271,9 +275,9 @@ class Session:
             self._progress = Progress(look, self._clock())
         progress = self._progress
         assert progress is not None
-        if progress.over or (progress.taken is not None and progress.taken.step.last):
+        if progress.over or progress.steps >= steps_of(configuration, look):
             return None
-        return step_of(configuration, look, self.attention, progress.steps)
+        return step_of(configuration, look, self.attention, progress.steps, self._encode_ms)
 
     async def _take(self, step: Step) -> None:
         """Render one step and offer it to every viewer."""
@@ -289,9 +293,14 @@ class Session:
             progress.over = True
             self._refuse(error)
             return
+        cost, steps = rendered.frame.cost, steps_of(configuration, progress.look)
+        progress.steps = steps_done(step, cost, progress.steps, steps)
+        if progress.steps >= steps and step.format in UNCHANGED_FORMATS and not progress.look.saccade:
+            step = replace(step, phase="final")
+        if step.phase == "moving":
+            self._encode_ms += ENCODE_GAIN * (encoded.encode_ms - self._encode_ms)
         progress.taken = Taken(step, attention, asked_ns, rendered)
-        progress.steps = steps_done(step, rendered.frame.cost.mean_samples, progress.steps)
-        self._counts.rejected += rendered.frame.cost.rejected_samples
+        self._counts.rejected += cost.rejected_samples
         self._show(progress.taken, encoded)
 
     async def _rendered(self, configuration: Configuration, progress: Progress, step: Step) -> tuple[Rendered, Encoded]:
@@ -334,11 +343,11 @@ class Session:
 
     def _finish(self) -> bool:
         """Work towards the lossless frame beside whatever else is done; whether something was done."""
-        progress = self._progress
-        if progress is None or progress.over or progress.taken is None:
+        configuration, progress = self.configuration, self._progress
+        if configuration is None or progress is None or progress.over or progress.taken is None:
             return False
-        taken = progress.taken
-        if taken.step.phase == "final" or progress.look.saccade or not taken.step.last:
+        taken, look = progress.taken, progress.look
+        if taken.step.phase == "final" or look.saccade or progress.steps < steps_of(configuration, look):
             return False
         if progress.lossless is None:
             if self._clock() - progress.since_ns < SETTLED_NS:

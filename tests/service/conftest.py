@@ -18,7 +18,7 @@ from service.server import Server, address_of, listen
 from service.settings import Settings
 from tests.service.chromium import Page, browsing, find_chromium
 
-PATIENCE_S = 15
+PATIENCE_S = 120
 """Longest wait for anything; kernels may have to be compiled first."""
 
 BROKEN_SCENE = "broken"

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import contextlib
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any, TypeVar
 
+import httpx
+from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
 from service import protocol
@@ -14,6 +17,25 @@ from tests.service.conftest import PATIENCE_S
 Wanted = TypeVar("Wanted")
 
 TINY = {"width_px": 64, "height_px": 36, "width_cm": 50.0, "distance_cm": 60.0}
+
+COARSE = {"samples_per_cell": 1, "gaze_bucket_px": 8, "acuity": {"scale": 40.0}}
+"""Cells of one pixel at the gaze and of several at the other end of a tiny screen."""
+
+
+NS_PER_S = 1_000_000_000
+
+
+class Clock:
+    """A clock that a test turns."""
+
+    def __init__(self) -> None:
+        self.now_ns = 10**15
+
+    def __call__(self) -> int:
+        return self.now_ns
+
+    def advance(self, seconds: float) -> None:
+        self.now_ns += int(seconds * NS_PER_S)
 
 
 class Peer:
@@ -53,8 +75,9 @@ class Peer:
 
     def closed(self) -> tuple[int, str]:
         """Code and reason with which the service ends the connection; what comes before is forgotten."""
-        for _ in self.connection:
-            pass
+        with contextlib.suppress(ConnectionClosed):
+            while True:
+                self.connection.recv(PATIENCE_S)
         close = self.connection.protocol.close_rcvd
         assert close is not None
         return close.code, close.reason
@@ -83,7 +106,16 @@ def source(address: str, session: str, **options: Any) -> Iterator[Peer]:
         yield found
 
 
-def configure(number: int = 1, scene: str = "matte", **changes: Any) -> protocol.Configure:
-    """A small configuration."""
-    fields = {"gaze": {"x": 32.0, "y": 18.0}, "display": TINY, "quality": {"samples_per_cell": 4}} | changes
-    return protocol.Configure(number, scene, **fields)
+def configure(
+    number: int = 1, scene: str = "matte", quality: Mapping[str, Any] | None = None, **changes: Any
+) -> protocol.Configure:
+    """A small configuration, with so much time that no frame needs coarser cells, however busy the machine is."""
+    quality = {"samples_per_cell": 4, "deadline_ms": 1000.0 * PATIENCE_S} | (quality or {})
+    fields = {"gaze": {"x": 32.0, "y": 18.0}, "display": TINY} | changes
+    return protocol.Configure(number, scene, quality=quality, **fields)
+
+
+def sessions(address: str) -> dict[str, Any]:
+    """The service's sessions by name."""
+    listed = httpx.get(f"{address}/v1/sessions", timeout=PATIENCE_S).json()["sessions"]
+    return {session["session"]: session for session in listed}
