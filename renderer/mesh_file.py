@@ -80,7 +80,8 @@ def read_model(folder: Folder, name: str, wanted_by: str, max_triangles: int = M
     label = folder.file_label(inner)
     if not data:
         raise SceneError(f"{label}: expected a mesh file, found an empty file")
-    model = _read(folder, data, inner, suffix, max_triangles)
+    with np.errstate(all="ignore"):  # numbers that are none are told by our own checks, not by numpy's warnings
+        model = _read(folder, data, inner, suffix, max_triangles)
     shown = tuple(_tamed(mesh) for mesh in model.meshes if len(mesh.faces))
     triangles = sum(len(mesh.faces) for mesh in shown)
     if not 0 < triangles <= max_triangles:

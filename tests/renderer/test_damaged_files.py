@@ -189,3 +189,19 @@ def test_damaged_files_give_a_model_or_a_scene_error(tmp_path: Path, name: str) 
         for mesh in model.meshes:
             assert np.isfinite(mesh.vertices).all()
             assert mesh.faces.max() < len(mesh.vertices)
+
+
+@pytest.mark.parametrize("name", ["a.glb", "little.ply", "big.ply", "binary.stl", "a.3ds"])
+@pytest.mark.parametrize("bits", ["7fa00000", "7fc00000", "7f800000", "ff800000", "7f7fffff"])
+def test_numbers_that_are_none_are_told_by_an_error_and_not_by_a_warning(tmp_path: Path, name: str, bits: str) -> None:
+    """Signalling and quiet NaN, both infinities and the largest float in place of each 1.0."""
+    one, number = (bytes.fromhex(part)[:: 1 if name == "big.ply" else -1] for part in ("3f800000", bits))
+    if name == "binary.stl":
+        one = bytes.fromhex("0000003f")
+    good = good_files()[name]
+    assert one in good
+    (tmp_path / "t.png").write_bytes(png((9, 8, 7)))
+    (tmp_path / name).write_bytes(good.replace(one, number))
+    message = read(tmp_path / name)
+    assert isinstance(message, str)
+    assert "expected finite coordinates" in message
