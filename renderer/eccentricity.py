@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from renderer.acuity import Acuity, unit_angle_line
 from renderer.display import Display
 from renderer.gaze import Gaze, GazeBucket
-from renderer.kernel import formula, kernel
+from renderer.kernel import formula, kernel, roomy_kernel
 
 DEG_PER_RAD = 180.0 / math.pi
 
@@ -265,7 +265,7 @@ def _even_cell_size(eye: EyeGeometry, x: float, y: float, reach: float) -> int:
     return int(low) if int(low) == int(high) else 0
 
 
-@kernel
+@roomy_kernel
 def fill_cell_sizes(eye: EyeGeometry, first_row: int, sizes: NDArray[np.uint16]) -> None:
     """Write rho of the pixels of rows first_row .. first_row + rows - 1 into `sizes`, (rows, w) uint16 [px].
 

@@ -1,27 +1,16 @@
-"""What a ray meets: triangles through Embree, spheres through their own tree, area lights one by one.
-
-The only file that talks to Embree. embreex checks no bounds, wants float32 C-contiguous arrays of equal
-length, overwrites a distance array it is given, and builds its tree at the first query; all of that is
-dealt with here.
-"""
+"""What a ray meets: triangles through Embree, spheres through their own tree, area lights one by one."""
 
 from __future__ import annotations
 
 import copy
 
 import numpy as np
-from embreex.mesh_construction import TriangleMesh
-from embreex.rtcore import EmbreeDevice
-from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import NDArray
 
 from renderer.area_light import nearest_area_lights
-from renderer.kernel import kernel
+from renderer.embree import EmbreeTriangles
 from renderer.rays import Hits
 from renderer.sphere import SphereTree, nearest_spheres, shade_spheres
-
-DEVICE = EmbreeDevice()
-"""Shared by all scenes: with about a thousand devices of their own Embree gives out null pointers."""
 
 
 class Intersector:
@@ -49,8 +38,10 @@ class Intersector:
         self.triangles = len(faces)
         self._spheres = spheres
         self._area_lights = area_lights
-        self._seen = _embree_scene(vertices, faces)
-        self._casting = self._seen if casts.all() else _embree_scene(vertices, faces[casts])
+        self._seen = EmbreeTriangles(vertices, faces) if len(faces) else None
+        self._casting = self._seen
+        if not casts.all():
+            self._casting = EmbreeTriangles(vertices, faces[casts]) if casts.any() else None
         self._sphere_casts = bool(spheres.casts.any())
 
     def all_casting(self) -> Intersector:
@@ -69,33 +60,15 @@ class Intersector:
         """
         n = _checked_length(origin, direction)
         if self._seen is None:
-            hits = Hits(
-                primitive=np.full(n, -1, dtype=np.int32),
-                distance=np.full(n, np.inf, dtype=np.float32),
-                u=np.zeros(n, dtype=np.float32),
-                v=np.zeros(n, dtype=np.float32),
-            )
+            hits = Hits(np.full(n, -1, dtype=np.int32), np.full(n, np.inf, dtype=np.float32))
         else:
-            found = self._seen.run(origin, direction, None, "INTERSECT", output=True)
-            hits = Hits(primitive=found["primID"], distance=found["tfar"], u=found["u"], v=found["v"])
+            hits = Hits(*self._seen.nearest(origin, direction))
         if len(self._spheres.radius):
             nearest_spheres(self._spheres, origin, direction, self.triangles, hits.distance, hits.primitive)
         if len(self._area_lights):
             first = self.triangles + len(self._spheres.radius)
             nearest_area_lights(self._area_lights, origin, direction, first, hits.distance, hits.primitive)
         return hits
-
-    def bare_nearest(self, origin: NDArray[np.float32], direction: NDArray[np.float32]) -> None:
-        """Embree's own nearest-hit query and nothing else: the yardstick of the benchmark."""
-        if self._seen is not None:
-            self._seen.run(origin, direction, None, "INTERSECT", output=True)
-
-    def bare_occluded(
-        self, origin: NDArray[np.float32], direction: NDArray[np.float32], reach: NDArray[np.float32]
-    ) -> None:
-        """Embree's own occlusion query and nothing else; the values of `reach` are lost."""
-        if self._casting is not None:
-            self._casting.run(origin, direction, reach, "OCCLUDED")
 
     def occluded(
         self, origin: NDArray[np.float32], direction: NDArray[np.float32], reach: NDArray[np.float32]
@@ -111,21 +84,22 @@ class Intersector:
         blocked = np.zeros(n, dtype=np.uint8)
         limit = reach.copy() if self._sphere_casts and self._casting is not None else reach
         if self._casting is not None:
-            _mark_blocked(self._casting.run(origin, direction, limit, "OCCLUDED"), blocked)
+            self._casting.occluded(origin, direction, limit, blocked)
         if self._sphere_casts:
             shade_spheres(self._spheres, origin, direction, reach, blocked)
         return blocked
 
+    def bare_nearest(self, origin: NDArray[np.float32], direction: NDArray[np.float32]) -> None:
+        """embreex's own nearest-hit query and nothing else: the yardstick of the benchmark."""
+        if self._seen is not None:
+            self._seen.yardstick.run(origin, direction, None, "INTERSECT", output=True)
 
-def _embree_scene(vertices: NDArray[np.float32], faces: NDArray[np.int32]) -> EmbreeScene | None:
-    """An Embree scene, robust mode, built; None where there is nothing to hit."""
-    if len(faces) == 0:
-        return None
-    scene = EmbreeScene(DEVICE, robust=True)
-    TriangleMesh(scene, np.ascontiguousarray(vertices), np.ascontiguousarray(faces))
-    probe = np.zeros((1, 3), dtype=np.float32)
-    scene.run(probe, np.array([[0, 0, 1]], dtype=np.float32), None, "INTERSECT")
-    return scene
+    def bare_occluded(
+        self, origin: NDArray[np.float32], direction: NDArray[np.float32], reach: NDArray[np.float32]
+    ) -> None:
+        """embreex's own occlusion query and nothing else; the values of `reach` are lost."""
+        if self._casting is not None:
+            self._casting.yardstick.run(origin, direction, reach, "OCCLUDED")
 
 
 def _checked_length(origin: NDArray[np.float32], direction: NDArray[np.float32]) -> int:
@@ -134,10 +108,3 @@ def _checked_length(origin: NDArray[np.float32], direction: NDArray[np.float32])
         if rays.dtype != np.float32 or rays.shape != (n, 3) or not rays.flags.c_contiguous:
             raise ValueError(f"expected ({n}, 3) contiguous float32 rays, found {rays.shape} {rays.dtype}")
     return n
-
-
-@kernel
-def _mark_blocked(answers: NDArray[np.int32], blocked: NDArray[np.uint8]) -> None:
-    """Embree answers 0 for a blocked ray and -1 for a clear one."""
-    for ray in range(len(blocked)):
-        blocked[ray] = 1 if answers[ray] == 0 else 0

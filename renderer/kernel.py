@@ -58,12 +58,22 @@ numba.config.CACHE_DIR = str(_cache_folder())  # type: ignore[attr-defined]
 
 
 def kernel(function: _F) -> _F:
-    """Compile a loop over arrays; it runs without the interpreter lock and is cached on disk."""
-    return cast(_F, numba.njit(nogil=True, cache=True, error_model="numpy")(function))
+    """Compile a loop over arrays it is given; it runs without the interpreter lock and is cached on disk.
+
+    It can make no arrays of its own (numba's run-time for them stays out). In return an array can be taken out
+    of a record anywhere, even for each ray: otherwise that counts references, which made shading three times slower.
+    """
+    options: dict[str, Any] = {"nogil": True, "cache": True, "error_model": "numpy", "_nrt": False}
+    return cast(_F, numba.njit(**options)(function))
 
 
 formula = kernel
 """The same for a small function of numbers that kernels call."""
+
+
+def roomy_kernel(function: _F) -> _F:
+    """A kernel that makes arrays of its own; it should take others out of their records before its loops."""
+    return cast(_F, numba.njit(nogil=True, cache=True, error_model="numpy")(function))
 
 
 def _prefetch(_context: Any, rows: Any, row: Any) -> Any:
@@ -88,3 +98,36 @@ def _prefetch(_context: Any, rows: Any, row: Any) -> Any:
 
 
 prefetch: Any = intrinsic(_prefetch)
+
+
+def _call(_context: Any, _function: Any, _a: Any, _b: Any, _c: Any, _d: Any) -> Any:
+    """Call the C function `void f(void*, void*, void*, void*)` at an address, with four addresses."""
+
+    def generate(target: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        word = ir.IntType(64)
+        pointer = ir.FunctionType(ir.VoidType(), [word] * 4).as_pointer()
+        builder.call(builder.inttoptr(arguments[0], pointer), arguments[1:])
+        return target.get_dummy_value()
+
+    return types.void(*[types.int64] * 5), generate
+
+
+call: Any = intrinsic(_call)
+
+
+def _at(_context: Any, _address: Any, sample: Any) -> Any:
+    """The numbers of the type of `sample` at an address, to be read and written by index."""
+
+    def generate(target: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return builder.inttoptr(arguments[0], target.get_data_type(signature.args[1]).as_pointer())
+
+    return types.CPointer(sample)(types.int64, sample), generate  # type: ignore[no-untyped-call]
+
+
+at: Any = intrinsic(_at)
+
+
+def c_function(function: Callable[[Any], None]) -> Any:
+    """Compile `function`, of one pointer to 64-bit words, for C to call; its `address` is what C wants."""
+    signature = types.void(types.CPointer(types.int64))  # type: ignore[no-untyped-call]
+    return numba.cfunc(signature, cache=True, error_model="numpy")(function)

@@ -49,13 +49,10 @@ class Hits(NamedTuple):
         primitive: (n,) int32: a triangle, a sphere (numbered after the triangles), an area light (numbered after
             the spheres) or -1 for nothing.
         distance: (n,) float32 in lengths of the direction; meaningless for a miss.
-        u, v: (n,) float32 barycentric weights of a triangle's second and third corner.
     """
 
     primitive: NDArray[np.int32]
     distance: NDArray[np.float32]
-    u: NDArray[np.float32]
-    v: NDArray[np.float32]
 
 
 def some_rays(rays: Rays, start: int, stop: int) -> Rays:

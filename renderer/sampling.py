@@ -123,7 +123,9 @@ def camera_rays(
     corner, step_x, step_y = view.corner, view.step_x, view.step_y
     origins, directions, weights, sample_of = rays.origin, rays.direction, rays.weight, rays.sample
     pencils = rays.pencil
-    pixel = math.sqrt(np.sqrt((step_x * step_x).sum()) * np.sqrt((step_y * step_y).sum()))
+    wide_step = step_x[0] * step_x[0] + step_x[1] * step_x[1] + step_x[2] * step_x[2]
+    high_step = step_y[0] * step_y[0] + step_y[1] * step_y[1] + step_y[2] * step_y[2]
+    pixel = math.sqrt(math.sqrt(wide_step) * math.sqrt(high_step))
     shift_u, shift_v = lattice_shift(1, points), lattice_shift(step, points)
     ray = 0
     for index in range(len(cells)):

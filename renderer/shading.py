@@ -28,7 +28,7 @@ from renderer.prepared import (
 )
 from renderer.rays import Hits, Rays, ShadowRays
 from renderer.reflectance import even_light
-from renderer.surface import Surface, sphere_surface, triangle_surface
+from renderer.surface import Surface, sphere_surface, triangle_surface, weights_at
 from renderer.texture import filtered
 
 SPHERE_DENSITY = 0.5 / math.sqrt(math.pi)
@@ -106,7 +106,7 @@ def shade(
     texels, pictures, linear = surfaces.textures.texels, surfaces.textures.pictures, surfaces.textures.linear
     origin, direction, weight, sample_of = rays.origin, rays.direction, rays.weight, rays.sample
     pencil, child_pencil = rays.pencil, children.pencil
-    primitive_of, distance, hit_u, hit_v = hits.primitive, hits.distance, hits.u, hits.v
+    primitive_of, distance = hits.primitive, hits.distance
     child_origin, child_direction = children.origin, children.direction
     child_weight, child_sample = children.weight, children.sample
     triangles = len(facets)
@@ -128,8 +128,14 @@ def shade(
             radiance[sample, 1] += wg * (high * around[0, 1] + low * around[1, 1])
             radiance[sample, 2] += wb * (high * around[0, 2] + low * around[1, 2])
             continue
+        b1, b2 = 0.0, 0.0
         if primitive < triangles:
-            s = triangle_surface(facets, primitive, np.float64(hit_u[ray]), np.float64(hit_v[ray]), dx, dy, dz)
+            b1, b2 = weights_at(
+                facets, primitive,
+                np.float64(origin[ray, 0]), np.float64(origin[ray, 1]), np.float64(origin[ray, 2]),
+                dx, dy, dz,
+            )  # fmt: skip
+            s = triangle_surface(facets, primitive, b1, b2, dx, dy, dz)
         elif primitive >= solids:
             lamp = area_lights[primitive - solids]
             radiance[sample, 0] += wr * lamp.red
@@ -165,7 +171,7 @@ def shade(
         ux, uy, uz = 0.0, 0.0, 0.0
         if material.calls & GRAINED != 0:
             if primitive < triangles:
-                ux, uy, uz = triangle_tangent(tangents, primitive, np.float64(hit_u[ray]), np.float64(hit_v[ray]), s)
+                ux, uy, uz = triangle_tangent(tangents, primitive, b1, b2, s)
             else:
                 ux, uy, uz = sphere_tangent(s)
         finish = Finish(kr, kg, kb, sr, sg, sb, ux, uy, uz)

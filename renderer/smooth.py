@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.cellmap import CellMap
-from renderer.kernel import formula, kernel
+from renderer.kernel import formula, roomy_kernel
 from renderer.reconstruction import STRIP_CELLS, mean_radiance
 from renderer.store import Samples
 from renderer.tonemap import FIRST_CODES, THRESHOLDS, srgb_code
@@ -113,7 +113,7 @@ def _place(index: int, length: int) -> tuple[int, np.float32]:
     return (0, -off_center) if off_center < 0 else (2, off_center)
 
 
-@kernel
+@roomy_kernel
 def _paint_cells(
     x: NDArray[np.int32],
     y: NDArray[np.int32],

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.kernel import formula, kernel
+from renderer.kernel import formula, roomy_kernel
 
 LEAF_SPHERES = 4
 """Most spheres in a leaf of the tree."""
@@ -154,7 +154,7 @@ def _box_entry(
     return enter if enter <= leave else math.inf
 
 
-@kernel
+@roomy_kernel
 def nearest_spheres(
     tree: SphereTree,
     origin: NDArray[np.float32],
@@ -205,7 +205,7 @@ def nearest_spheres(
             primitive[ray] = first_id + found
 
 
-@kernel
+@roomy_kernel
 def shade_spheres(
     tree: SphereTree,
     origin: NDArray[np.float32],

@@ -68,6 +68,30 @@ def _lift(px: float, py: float, pz: float, cx: float, cy: float, cz: float, nx: 
 
 
 @formula
+def weights_at(
+    f: NDArray[np.float32], t: int, ox: float, oy: float, oz: float, dx: float, dy: float, dz: float
+) -> tuple[float, float]:
+    """Barycentric weights of the second and third corner of facet `t` where a ray that is known to hit it does.
+
+    In float64 from the ray and the corners alone (Moller and Trumbore 1997), so that they do not depend on how
+    the search found the triangle; cut off at its edges, which Embree's robust mode reaches a little beyond.
+    """
+    ax, ay, az = np.float64(f[t, 0]), np.float64(f[t, 1]), np.float64(f[t, 2])
+    bx, by, bz = f[t, 8] - ax, f[t, 9] - ay, f[t, 10] - az
+    cx, cy, cz = f[t, 16] - ax, f[t, 17] - ay, f[t, 18] - az
+    hx, hy, hz = dy * cz - dz * cy, dz * cx - dx * cz, dx * cy - dy * cx
+    volume = bx * hx + by * hy + bz * hz
+    if volume == 0.0:
+        return 0.0, 0.0
+    sx, sy, sz = ox - ax, oy - ay, oz - az
+    qx, qy, qz = sy * bz - sz * by, sz * bx - sx * bz, sx * by - sy * bx
+    b1 = min(1.0, max(0.0, (sx * hx + sy * hy + sz * hz) / volume))
+    b2 = min(1.0, max(0.0, (dx * qx + dy * qy + dz * qz) / volume))
+    beyond = max(1.0, b1 + b2)
+    return b1 / beyond, b2 / beyond
+
+
+@formula
 def triangle_surface(f: NDArray[np.float32], t: int, b1: float, b2: float, dx: float, dy: float, dz: float) -> Surface:
     """The surface of facet `t` of the facets `f` at barycentric weights b1, b2 of its second and third corner.
 

@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.kernel import formula, kernel
+from renderer.kernel import formula, kernel, roomy_kernel
 
 TILE_PX = 32
 """Width of the columns in which cells are numbered, so that neighbours on the screen are near in memory [px]."""
@@ -34,7 +34,7 @@ def strip_rows(largest_side: int, height_px: int) -> int:
     return min(height_px, period * max(1, -(-48 // period)))
 
 
-@kernel
+@roomy_kernel
 def mark_aligned(sizes: NDArray[np.uint16], corners: NDArray[np.uint16]) -> int:
     """Tile one strip: write the corners of its aligned squares into `corners` and return how many there are.
 
@@ -69,7 +69,7 @@ def mark_aligned(sizes: NDArray[np.uint16], corners: NDArray[np.uint16]) -> int:
     return count
 
 
-@formula
+@roomy_kernel
 def _halve(floor: NDArray[np.uint16]) -> NDArray[np.uint16]:
     """Smallest rho of each 2x2 group; groups cut by the edge are left out."""
     rows, columns = floor.shape[0] // 2, floor.shape[1] // 2
@@ -82,7 +82,7 @@ def _halve(floor: NDArray[np.uint16]) -> NDArray[np.uint16]:
     return coarse
 
 
-@formula
+@roomy_kernel
 def _refine(coarse: NDArray[np.uint8], rows: int, columns: int) -> NDArray[np.uint8]:
     """The same coverage on units of half the side; units beyond the coarse grid are uncovered."""
     fine = np.zeros((rows, columns), dtype=np.uint8)

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from renderer.camera import Camera, view_frame
 from renderer.display import Display
 from renderer.pipeline import Renderer
-from renderer.prepared import prepare
+from renderer.prepared import FACET, prepare
 from renderer.scene import Material, Mesh, Rgb, Scene, Sphere
+from renderer.surface import weights_at
 from tests.renderer.drawing import (
     EVERYWHERE_1,
     WHITE,
@@ -71,7 +72,10 @@ def hits_of(mesh: Mesh, camera: Camera, side_px: int) -> tuple[NDArray[np.bool_]
     direction = (direction / np.linalg.norm(direction, axis=2, keepdims=True)).astype(np.float32).reshape(-1, 3)
     position = ((np.array(camera.position) - prepared.center) * prepared.scale).astype(np.float32)
     hits = prepared.intersector.nearest(np.tile(position, (len(direction), 1)), direction)
-    weights = np.stack([1.0 - hits.u - hits.v, hits.u, hits.v], axis=1)
+    weights = np.zeros((len(direction), 3))
+    for ray, (x, y, z) in enumerate(direction.astype(np.float64)):
+        b1, b2 = weights_at(prepared.surfaces.facets, hits.primitive[ray], *position.astype(np.float64), x, y, z)
+        weights[ray] = 1.0 - b1 - b2, b1, b2
     normals = (weights[:, :, None] * mesh.normals[mesh.faces[hits.primitive]]).sum(axis=1)
     return hits.primitive >= 0, normals / np.linalg.norm(normals, axis=1, keepdims=True)
 
@@ -152,3 +156,26 @@ def test_the_poles_of_a_ball_are_no_special_place(renderer: Renderer) -> None:
     for up in (1.0, -1.0):
         scene = Scene(spheres=(Sphere((0, 0, 0), 1.0, WHITE_LAMBERT),), lights=(light(0, up * 3, 0, math.pi * 4),))
         assert pixel(renderer, scene, camera=aim((0, up * 3, 0), (0, 0, 0))) == pytest.approx(1.0, rel=8 * U)
+
+
+@pytest.mark.parametrize("size", [1e-6, 1.0, 1e6])
+def test_the_weights_are_those_of_the_point_the_ray_goes_to(size: float) -> None:
+    """And stay inside the triangle for a ray that passes it by; a triangle without area has its first corner."""
+    rng = np.random.default_rng(8)
+    for _ in range(200):
+        corners = (size * rng.uniform(-1, 1, (3, 3))).astype(np.float32)
+        facet = np.zeros((1, FACET), dtype=np.float32)
+        facet[0, :24].reshape(3, 8)[:, :3] = corners
+        weights = rng.dirichlet((1, 1, 1))
+        origin = size * rng.uniform(-9, 9, 3)
+        direction = weights @ corners.astype(np.float64) - origin
+        direction /= np.linalg.norm(direction)
+        grazing = abs(np.linalg.det([*(corners[1:].astype(np.float64) - corners[0]), direction * size]))
+        b1, b2 = weights_at(facet, 0, *origin, *direction)
+        np.testing.assert_allclose((b1, b2), weights[1:], atol=1e-13 * size**3 * 20 / grazing)
+        b1, b2 = weights_at(facet, 0, *origin, *rng.normal(size=3))
+        assert 0.0 <= b1 <= 1.0
+        assert 0.0 <= b2 <= 1.0
+        assert b1 + b2 <= 1.0 + 1e-15
+    facet[:] = 1.0
+    assert weights_at(facet, 0, 0.0, 0.0, 9.0, 0.0, 0.0, -1.0) == (0.0, 0.0)
