@@ -3,7 +3,7 @@
 | COLLADA | becomes |
 |---|---|
 | diffuse colour or texture | diffuse; diffuse_texture (then diffuse is 1) |
-| specular, of phong and blinn | specular = colour / pi |
+| specular colour or texture, of phong and blinn | specular = colour / pi; specular_texture (then 1 / pi) |
 | shininess s, of phong | shininess = s; a value up to 1 counts as a share of 128 |
 | shininess s, of blinn | shininess = s / 4, for the lobe round the half vector is that much narrower |
 | emission | emission; of a texture nothing |
@@ -88,25 +88,29 @@ def read_effect(
     params = {found.attributes.get("sid", ""): found for found in effect.descendants() if found.tag == "newparam"}
     stated = shader.first("diffuse/texture")
     texture = None if stated is None else _texture(stated, params, images, textures)
+    shiny = shader.tag in ("phong", "blinn")
+    shown = shader.first("specular/texture") if shiny else None
+    shine = None if shown is None else _texture(shown, params, images, textures)
+    specular = _color(shader, "specular", (0.0, 0.0, 0.0, 1.0))[:3] if shine is None else _WHITE
     diffuse = _color(shader, "diffuse", _GREY if shader.tag != "constant" else (0.0, 0.0, 0.0, 1.0))[:3]
     if texture is not None:
         diffuse = _WHITE
     opacity = _opacity(shader)
     clear = opacity if mistaken and _states_opacity(shader) else (1.0 - opacity[0], 1.0 - opacity[1], 1.0 - opacity[2])
-    shiny = shader.tag in ("phong", "blinn")
     ior = shader.number("index_of_refraction/float", 1.0)
     mirror = _color(shader, "reflective", (0.0, 0.0, 0.0, 1.0))[:3]
     try:
         material = Material(
             name,
             diffuse=_product(diffuse, (1.0 - clear[0], 1.0 - clear[1], 1.0 - clear[2])),
-            specular=_scaled(_color(shader, "specular", (0.0, 0.0, 0.0, 1.0))[:3], 1.0 / math.pi) if shiny else BLACK,
+            specular=_scaled(specular, 1.0 / math.pi) if shiny else BLACK,
             shininess=_shininess(shader),
             emission=_color(shader, "emission", (0.0, 0.0, 0.0, 1.0))[:3],
             reflection=_scaled(mirror, _share(shader, "reflectivity", 0.0)),
             transmission=clear,
             ior=min(max(ior, 1.0), 10.0),
             diffuse_texture=texture,
+            specular_texture=shine,
         )
     except SettingsError as error:
         raise shader.refuse(error.expected, f"{error.field} {error.found}") from None

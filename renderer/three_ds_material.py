@@ -4,11 +4,12 @@
 |---|---|
 | diffuse colour, texture map 1 | diffuse, diffuse_texture (then diffuse is 1) |
 | specular colour, shininess strength | specular = colour * strength / pi |
+| specular map | specular_texture, laid on as texture map 1 (then the specular colour is 1) |
 | shininess s | shininess = 2^(10 s) |
 | transparency t | transmission = t with ior 1; what is let through is taken from the diffuse |
 | self-illumination e | emission = e * diffuse |
 
-Colours are display codes, turned into linear light. Other maps than texture map 1 are left out.
+Colours are display codes, turned into linear light. All other maps are left out.
 
 Source: 3D Studio File Toolkit, 1996; J. E. Hoffmann and J. Kyprianidis, lib3ds (the exponent).
 """
@@ -28,7 +29,7 @@ from renderer.three_ds_chunk import Chunk
 _NAME: Final = 0xA000
 _DIFFUSE, _SPECULAR = 0xA020, 0xA030
 _SHININESS, _STRENGTH, _TRANSPARENCY, _SELF_ILLUMINATION = 0xA040, 0xA041, 0xA050, 0xA084
-_TEXTURE, _TEXTURE_NAME = 0xA200, 0xA300
+_TEXTURE, _SPECULAR_MAP, _MAP_NAME = 0xA200, 0xA204, 0xA300
 _V_SCALE, _U_SCALE, _U_OFFSET, _V_OFFSET = 0xA354, 0xA356, 0xA358, 0xA35A
 
 _GREY: Final[Rgb] = (0.8, 0.8, 0.8)
@@ -55,7 +56,7 @@ def read_material(chunk: Chunk, textures: TextureSearch) -> ThreeDsMaterial:
     """
     name, diffuse, specular = "", _GREY, BLACK
     shares = {_SHININESS: 0.5, _STRENGTH: 1.0, _TRANSPARENCY: 0.0, _SELF_ILLUMINATION: 0.0}
-    texture_name = ""
+    texture_name, shine_name = "", ""
     laid: dict[int, float] = {}
     for part in chunk.chunks():
         if part.kind == _NAME:
@@ -68,9 +69,14 @@ def read_material(chunk: Chunk, textures: TextureSearch) -> ThreeDsMaterial:
             shares[part.kind] = part.share(shares[part.kind])
         elif part.kind == _TEXTURE:
             texture_name, laid = _texture_map(part)
+        elif part.kind == _SPECULAR_MAP:
+            shine_name, _ = _texture_map(part)
     texture = textures.load(texture_name) if texture_name else None
     if texture is not None:
         diffuse = _WHITE
+    shine = textures.load(shine_name) if shine_name else None
+    if shine is not None:
+        specular = _WHITE
     clear = shares[_TRANSPARENCY]
     material = Material(
         name,
@@ -81,6 +87,7 @@ def read_material(chunk: Chunk, textures: TextureSearch) -> ThreeDsMaterial:
         transmission=(clear, clear, clear),
         ior=1.0 if clear > 0.0 else 1.5,
         diffuse_texture=texture,
+        specular_texture=shine,
     )
     return ThreeDsMaterial(
         material,
@@ -93,7 +100,7 @@ def _texture_map(chunk: Chunk) -> tuple[str, dict[int, float]]:
     """The file of a texture map, and its scales and offsets."""
     name, laid = "", {}
     for part in chunk.chunks():
-        if part.kind == _TEXTURE_NAME:
+        if part.kind == _MAP_NAME:
             name = part.text()[0]
         elif part.kind in (_V_SCALE, _U_SCALE, _U_OFFSET, _V_OFFSET):
             value = float(part.floats(1)[0][0])

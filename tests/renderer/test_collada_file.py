@@ -286,13 +286,16 @@ def test_textures_by_way_of_sampler_and_surface(tmp_path: Path, path: str) -> No
         '<input semantic="TEXCOORD" source="#t1" offset="1" set="1"/><p>0 0 1 0 2 0</p></triangles>'
     )
     bind = '<bind_vertex_input semantic="UV1" input_semantic="TEXCOORD" input_set="1"/>'
-    text = looked(f"{params}<technique><lambert>{diffuse}</lambert></technique>", bind, images)
+    specular = '<specular><texture texture="i" texcoord="UV1"/></specular>'
+    text = looked(f"{params}<technique><phong>{diffuse}{specular}</phong></technique>", bind, images)
     text = text.replace(DAE_TRIANGLES, primitive).replace(DAE_SQUARE, sources)
     model = read(tmp_path, text)
     (mesh,) = model.meshes
     assert mesh.material.diffuse_texture is not None
     np.testing.assert_array_equal(mesh.material.diffuse_texture.pixels, [[[10, 20, 30]]])
     assert mesh.material.diffuse == (1.0, 1.0, 1.0)
+    assert mesh.material.specular_texture is not None
+    np.testing.assert_allclose(mesh.material.specular, 1 / math.pi)
     np.testing.assert_array_equal(mesh.uvs, [[0.5, 0.25]] * 3)
     assert model.notes == ()
 

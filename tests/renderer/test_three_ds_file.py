@@ -72,6 +72,7 @@ def test_materials_and_face_groups(tmp_path: Path) -> None:
     (tmp_path / "Wood.PNG").write_bytes(png((10, 20, 30)))
     laid = chunk(0xA356, struct.pack("<f", 2)) + chunk(0xA35A, struct.pack("<f", 0.5))
     picture = chunk(0xA200, chunk(0xA300, b"C:\\MAPS\\WOOD.png\0"), laid)
+    shine = chunk(0xA204, chunk(0xA300, b"wood.png\0"))
     uvs = chunk(0x4140, struct.pack("<H16f", 8, *([0.25, 1.0] * 8)))
     colors = color(0xA020, 255, 128, 0) + color(0xA030, 255, 255, 255)
     glassy = material(colors, percent(0xA040, 30), percent(0xA041, 50), percent(0xA050, 25))
@@ -80,7 +81,7 @@ def test_materials_and_face_groups(tmp_path: Path) -> None:
         tmp_path,
         glassy,
         three_ds_object("Box", three_ds_cube(uvs, in_faces=groups)),
-        material(picture, percent(0xA084, 50), name="wood"),
+        material(picture, shine, percent(0xA084, 50), name="wood"),
     )
     first, wood, unknown, rest = model.meshes
     assert [len(mesh.faces) for mesh in model.meshes] == [3, 2, 1, 6]
@@ -92,6 +93,8 @@ def test_materials_and_face_groups(tmp_path: Path) -> None:
     assert first.material.ior == 1.0
     assert wood.material.diffuse_texture is not None
     assert wood.material.diffuse == (1.0, 1.0, 1.0)
+    assert wood.material.specular_texture is not None
+    np.testing.assert_allclose(wood.material.specular, 1 / math.pi)
     assert wood.material.emission == (0.5, 0.5, 0.5)
     assert wood.uvs is not None
     np.testing.assert_allclose(wood.uvs, [[0.5, 1.5]] * len(wood.vertices))
