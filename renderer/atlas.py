@@ -31,8 +31,8 @@ class TextureAtlas(NamedTuple):
     """Pictures one after another, each followed by its smaller levels, down to one texel.
 
     Attributes:
-        texels: (n,) uint32 sRGB codes, red | green << 8 | blue << 16, row by row, row 0 of each picture
-            at the top.
+        texels: (n,) uint32 sRGB codes, red | green << 8 | blue << 16 | opacity << 24, row by row, row 0 of each
+            picture at the top; smaller levels have no opacity.
         pictures: (k,) PICTURE, the levels of each picture in a row, the largest first.
         linear: (256,) float64 linear light of each code (IEC 61966-2-1).
     """
@@ -64,7 +64,8 @@ def build_atlas(textures: list[Texture]) -> tuple[TextureAtlas, dict[Texture, in
 
 def _levels(texture: Texture, linear: NDArray[np.float64]) -> list[NDArray[np.uint32]]:
     """(h, w) uint32 codes of a texture, and of each half of it down to one texel."""
-    levels = [texture.pixels.astype(np.uint32) @ np.array([1, 1 << 8, 1 << 16], dtype=np.uint32)]
+    colours = texture.pixels.astype(np.uint32) @ np.array([1, 1 << 8, 1 << 16], dtype=np.uint32)
+    levels = [colours | (texture.opacity.astype(np.uint32) << np.uint32(24))]
     while levels[-1].size > 1:
         height, width = levels[-1].shape
         levels.append(np.zeros((max(1, height // 2), max(1, width // 2)), dtype=np.uint32))

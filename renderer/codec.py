@@ -77,8 +77,8 @@ def encode(pixels: NDArray[np.uint8] | NDArray[np.float32], image_format: str, q
 def decode_texture(data: bytes, name: str, max_pixels: int = MAX_TEXTURE_PIXELS) -> Texture:
     """The texture in an image file.
 
-    Grey, palette, CMYK and 16-bit images become 8-bit RGB; transparency is dropped, its colours kept. Of
-    an animation, the first picture.
+    Grey, palette, CMYK and 16-bit images become 8-bit RGB; transparency becomes the texture's alpha, unless all
+    of the image is whole. Of an animation, the first picture.
 
     Args:
         data: the whole file: PNG, JPEG, WebP, BMP, TGA, GIF, TIFF, PPM or PCX.
@@ -95,6 +95,7 @@ def decode_texture(data: bytes, name: str, max_pixels: int = MAX_TEXTURE_PIXELS)
             width, height = image.size
             if not 0 < width * height <= max_pixels:
                 raise SceneError(f"{name}: expected 1 to {max_pixels} pixels, found {width} x {height}")
+            alpha = _alpha8(image)
             pixels = _rgb8(image, name)
     except SceneError:
         raise
@@ -108,7 +109,7 @@ def decode_texture(data: bytes, name: str, max_pixels: int = MAX_TEXTURE_PIXELS)
             f"found {found or type(error).__name__}"
         ) from error
     pixels.flags.writeable = False
-    return Texture(pixels, name)
+    return Texture(pixels, name, alpha=alpha)
 
 
 def _save_options(image_format: str, quality: int) -> dict[str, int]:
@@ -130,6 +131,15 @@ def _rgb8(image: Image.Image, name: str) -> NDArray[np.uint8]:
         # straight to RGB, Pillow warns about palettes that carry transparency
         image = image.convert("RGBA")
     return np.array(image.convert("RGB"), dtype=np.uint8)
+
+
+def _alpha8(image: Image.Image) -> NDArray[np.uint8] | None:
+    """(h, w) uint8 alpha of an opened image; None where nothing of it is transparent."""
+    if image.mode.startswith("I") or not image.has_transparency_data:
+        return None
+    alpha = np.array(image.convert("RGBA").getchannel("A"), dtype=np.uint8)
+    alpha.flags.writeable = False
+    return None if alpha.min() == 255 else alpha
 
 
 def _grey16(image: Image.Image, name: str) -> NDArray[np.uint8]:

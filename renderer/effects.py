@@ -58,6 +58,7 @@ def plan_effects(scene: Scene) -> EffectPlan:
     }
     casters = _casters(scene)
     calls: dict[str, Callable[[Material], bool]] = {
+        "cutouts": has_holes,
         "textures": lambda material: bool(textures_of(material)),
         "specular": lambda material: has_highlight(material) and bool(lights),
         "shadows": lambda material: _takes_light(material) and bool(casting["shadows"]) and casters > 0,
@@ -87,6 +88,12 @@ def forced_plan(plan: EffectPlan, choice: EffectChoice) -> EffectPlan:
     return EffectPlan(tuple(Effect(name, reasons[name]) for name in EFFECTS if name in reasons), forced)
 
 
+def has_holes(material: Material) -> bool:
+    """Whether its alpha map cuts something out of it."""
+    texture = material.alpha_texture
+    return texture is not None and int(texture.opacity.min()) < 255 * material.alpha_cutoff
+
+
 def textures_of(material: Material) -> list[Texture]:
     """The textures of a material that change its colour; one that multiplies black does not."""
     shown = []
@@ -95,6 +102,12 @@ def textures_of(material: Material) -> list[Texture]:
     if material.specular_texture is not None and (material.specular != BLACK or material.reflection != BLACK):
         shown.append(material.specular_texture)
     return shown
+
+
+def pictures_of(material: Material) -> list[Texture]:
+    """All textures of a material that are looked up."""
+    holes = material.alpha_texture
+    return [*textures_of(material), *([holes] if holes is not None and has_holes(material) else [])]
 
 
 def _material_users(scene: Scene) -> dict[Material, Counter[str]]:

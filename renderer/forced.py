@@ -1,7 +1,8 @@
 """A prepared scene with effects forced on or off, sharing everything else with the scene it comes from.
 
 Forced on, `shadows` and `soft_shadows` make every light and every object cast them, whatever the author
-says; any other effect runs on every surface and, where nothing calls for it, brings nothing but its cost.
+says, and cut-outs cast whole ones; any other effect runs on every surface and, where nothing calls for it,
+brings nothing but its cost.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import numpy as np
 
 from renderer.atlas import build_atlas
 from renderer.effect_choice import EffectChoice
-from renderer.effects import forced_plan, textures_of
+from renderer.effects import forced_plan, pictures_of
 from renderer.prepared import PreparedScene, calls_of, used_materials
 from renderer.scene import Texture
 
@@ -21,7 +22,8 @@ MOST_VARIANTS = 8
 """Variants of a scene that are kept; they are cheap to make."""
 
 PICTURES = ("picture", "specular_picture")
-"""Fields of the material table that name a texture."""
+HOLES = ("alpha_picture",)
+"""Fields of the material table that name a texture, for colours and for holes."""
 
 WHITE = Texture(np.full((1, 1, 3), 255, dtype=np.uint8), "white")
 """What surfaces without a texture look up where textures are forced on."""
@@ -48,10 +50,12 @@ def _forced(prepared: PreparedScene, choice: EffectChoice) -> PreparedScene:
     if "textures" not in plan.names:
         for name in PICTURES:
             materials[name] = -1
-    elif "textures" in plan.forced:
-        shown = itertools.chain(*(textures_of(material) for material in used_materials(prepared.scene)))
+    if "cutouts" not in plan.names:
+        materials["alpha_picture"] = -1
+    if plan.forced & {"textures", "cutouts"}:
+        shown = itertools.chain(*(pictures_of(material) for material in used_materials(prepared.scene)))
         textures, picture = build_atlas([*dict.fromkeys(shown), WHITE])
-        for name in PICTURES:
+        for name in (*(PICTURES if "textures" in plan.forced else ()), *(HOLES if "cutouts" in plan.forced else ())):
             materials[name][materials[name] == -1] = picture[WHITE]
     lights, area_lights = surfaces.lights.copy(), surfaces.area_lights.copy()
     for table, effect in ((lights, "shadows"), (area_lights, "soft_shadows")):
@@ -61,10 +65,14 @@ def _forced(prepared: PreparedScene, choice: EffectChoice) -> PreparedScene:
             table["casts"] = 1
     if plan.forced & {"shadows", "soft_shadows"}:
         intersector = intersector.all_casting()
+    sieve = prepared.sieve
+    if sieve is not None:
+        sieve = sieve._replace(surfaces=sieve.surfaces._replace(materials=materials, textures=textures))
     return dataclasses.replace(
         prepared,
         plan=plan,
         surfaces=surfaces._replace(materials=materials, lights=lights, area_lights=area_lights, textures=textures),
         intersector=intersector,
+        sieve=sieve,
         variants={},
     )

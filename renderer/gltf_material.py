@@ -9,7 +9,8 @@
 | emissiveFactor, KHR_materials_emissive_strength | emission |
 | KHR_materials_transmission t | transmission = t (1 - m) base |
 | KHR_materials_ior | ior, 1.5 unless stated, where KHR_materials_volume has a thickness; else 1, a thin sheet |
-| alphaMode BLEND, alpha a | where t = 0: transmission = 1 - a with ior 1 |
+| alphaMode MASK | holes where the alpha of the base colour is below alphaCutoff |
+| alphaMode BLEND, alpha a | where t = 0: transmission = 1 - a with ior 1; holes where its texture is below 1/2 |
 | KHR_materials_unlit | emission = base, no diffuse (with a texture it is lit: emission has none) |
 
 What is let through is taken from the diffuse. Of the metallic-roughness and emissive textures, and of the
@@ -82,8 +83,12 @@ def read_material(fields: Fields, name: str, load: _LOAD) -> GltfMaterial:
     share = metallic * (1.0 - roughness) ** 2
     stated_ior = extensions.table("KHR_materials_ior").number("ior", 0.0, 10.0, 1.5) or 1.5
     transmission, ior = _transmission(extensions, tint, metallic, stated_ior)
-    if transmission == BLACK and fields.choice("alphaMode", ("OPAQUE", "MASK", "BLEND"), "OPAQUE") == "BLEND":
+    mode = fields.choice("alphaMode", ("OPAQUE", "MASK", "BLEND"), "OPAQUE")
+    if transmission == BLACK and mode == "BLEND":
         transmission, ior = (1.0 - alpha, 1.0 - alpha, 1.0 - alpha), 1.0
+    cutoff = 0.5
+    if mode == "MASK":
+        cutoff = min(1.0, fields.number("alphaCutoff", 0.0, 1e30, 0.5) / max(alpha, 1e-9))
     exponent = 2.0 / max(roughness, MIN_ROUGHNESS) ** 4 - 2.0
     head_on = ((stated_ior - 1.0) / (stated_ior + 1.0)) ** 2
     mirrored = _mixed((head_on, head_on, head_on), tint, metallic)
@@ -98,6 +103,8 @@ def read_material(fields: Fields, name: str, load: _LOAD) -> GltfMaterial:
             transmission=transmission,
             ior=ior,
             diffuse_texture=texture,
+            alpha_texture=texture if mode != "OPAQUE" and texture is not None and texture.alpha is not None else None,
+            alpha_cutoff=cutoff,
         )
     except SettingsError as error:
         raise fields.in_file(error) from None

@@ -1,6 +1,7 @@
 """Materials of OBJ files (.mtl) as this renderer's materials.
 
-The statements `Kd Ks Ns Ke illum Ni Tf d Tr map_Kd map_Ks` are honoured, in any case of letters; all others are
+The statements `Kd Ks Ns Ke illum Ni Tf d Tr map_Kd map_Ks map_d` are
+honoured, in any case of letters; all others are
 skipped, and so are the options of maps but for `-clamp on`. A highlight `Ks` is meant relative to `Kd` under the
 same light, so it becomes specular = Ks/pi.
 
@@ -15,7 +16,8 @@ same light, so it becomes specular = Ks/pi.
 
 With any other illum, d < 1 lets through 1 - d with ior 1. What is let through is taken from the
 diffuse: diffuse = Kd * (1 - transmission). Tr is 1 - d, and gives way to d. Without Kd it is 0.8, or 1
-under a texture; without Ks it is 0, or 1 under a texture. Reflectances above 1 count as 1.
+under a texture; without Ks it is 0, or 1 under a texture. Reflectances above 1 count as 1. `map_d` cuts holes
+where it is below one half: its alpha, or without alpha its green.
 
 Source: B. Fedosejevs, MTL material format (Lightwave, OBJ), 1995, sections "Material color and
 illumination statements" and "Illumination models".
@@ -36,7 +38,7 @@ GLASS_IOR = 1.5
 """Index of refraction of glass whose file states none."""
 
 _HONOURED = frozenset({"kd", "ks", "ke", "tf", "ns", "ni", "d", "tr", "illum"})
-_MAPS = frozenset({"map_kd", "map_ks"})
+_MAPS = frozenset({"map_kd", "map_ks", "map_d"})
 _WHITE: Rgb = (1.0, 1.0, 1.0)
 _MIRRORS = (3, 5, 8)
 _GLASS = (4, 6, 7, 9)
@@ -159,6 +161,7 @@ def _material(name: str, block: _Statements) -> Material:
         ior=_ior(block),
         diffuse_texture=texture,
         specular_texture=shine,
+        alpha_texture=block.maps.get("map_d"),
     )
 
 

@@ -7,8 +7,10 @@ Degenerate triangles and exact copies are left out: they show nothing and slow e
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -19,11 +21,11 @@ from renderer.area_light import area_light_table
 from renderer.atlas import TextureAtlas, build_atlas
 from renderer.direction import unit
 from renderer.effect_choice import EffectChoice
-from renderer.effects import EffectPlan, has_highlight, is_boundary, plan_effects, textures_of
+from renderer.effects import EffectPlan, has_highlight, has_holes, is_boundary, pictures_of, plan_effects
 from renderer.errors import SceneError
 from renderer.intersection import Intersector
 from renderer.light_reach import reaching_lights
-from renderer.scene import Material, Mesh, PointLight, Scene, Texture
+from renderer.scene import Material, Mesh, PointLight, Scene, Sphere, Texture
 from renderer.sphere import SphereTree, build_sphere_tree
 from renderer.tangent import TANGENT, mesh_tangents
 
@@ -61,8 +63,10 @@ MATERIAL = np.dtype(
     [
         *_COLOURS,
         *((name, np.float32) for name in ("shininess", "ior", "exponent_u", "exponent_v")),
+        ("alpha_cutoff", np.float32),
         ("picture", np.int32),
         ("specular_picture", np.int32),
+        ("alpha_picture", np.int32),
         ("calls", np.int32),
     ]
 )
@@ -99,6 +103,18 @@ class Surfaces(NamedTuple):
     textures: TextureAtlas
 
 
+class Sieve(NamedTuple):
+    """The cut-out things of a scene that cast shadows: rays to lights pass their holes.
+
+    Attributes:
+        surfaces: their triangles and spheres alone, with the materials and textures of the scene.
+        intersector: over the same.
+    """
+
+    surfaces: Surfaces
+    intersector: Intersector
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class PreparedScene:
     """A scene ready to be traced.
@@ -112,6 +128,7 @@ class PreparedScene:
         surfaces: what the kernels read.
         intersector: what answers rays.
         nbytes: approximate size in memory.
+        sieve: its cut-out things that cast shadows; None where there are none.
         identity: stands for the scene in caches, so that they do not keep the scene itself in memory.
         variants: the same with effects forced on or off, by choice, for `with_effects`.
     """
@@ -124,6 +141,7 @@ class PreparedScene:
     surfaces: Surfaces
     intersector: Intersector
     nbytes: int
+    sieve: Sieve | None = None
     identity: object = field(default_factory=object)
     variants: dict[EffectChoice, PreparedScene] = field(default_factory=dict)
 
@@ -141,22 +159,23 @@ def prepare(scene: Scene) -> PreparedScene:
     plan = plan_effects(scene)
     center, scale = _centre_and_scale(scene)
     materials = used_materials(scene)
-    atlas, picture = build_atlas(list(dict.fromkeys(itertools.chain(*map(textures_of, materials)))))
+    atlas, picture = build_atlas(list(dict.fromkeys(itertools.chain(*map(pictures_of, materials)))))
     row = {material: index for index, material in enumerate(materials)}
     vertices, faces, facets, tangents, casts = _triangles(scene, row, center, scale)
-    spheres = build_sphere_tree(
-        (np.array([sphere.center for sphere in scene.spheres]).reshape(-1, 3) - center) * scale,
-        np.array([sphere.radius for sphere in scene.spheres], dtype=np.float64) * scale,
-        np.array([row[sphere.material] for sphere in scene.spheres], dtype=np.int32),
-        np.array([sphere.casts_shadows for sphere in scene.spheres], dtype=np.uint8),
-    )
+    table = _material_table(materials, picture, plan)
+    pierced = table["alpha_picture"] >= 0
+    whole = ~pierced[facets[:, MATERIAL_COLUMN].astype(np.int64)]
+    spheres = _sphere_tree(
+        [dataclasses.replace(s, casts_shadows=s.casts_shadows and not pierced[row[s.material]]) for s in scene.spheres],
+        row, center, scale,
+    )  # fmt: skip
     lights = reaching_lights(scene)
     area_lights = [light for light in scene.lights if not isinstance(light, PointLight) and any(light.radiance)]
     surfaces = Surfaces(
         facets=facets,
         tangents=tangents,
         spheres=spheres,
-        materials=_material_table(materials, picture, plan),
+        materials=table,
         textures=atlas,
         lights=_light_table([light for light in lights if isinstance(light, PointLight)], plan, center, scale),
         area_lights=area_light_table(area_lights, lights, center, scale, "soft_shadows" in plan.names),
@@ -164,13 +183,46 @@ def prepare(scene: Scene) -> PreparedScene:
             [scene.surroundings.zenith, scene.surroundings.horizon, scene.surroundings.ambient], dtype=np.float64
         ),
     )
-    intersector = Intersector(vertices, faces, casts, spheres, surfaces.area_lights)
+    intersector = Intersector(vertices, faces, casts & whole, spheres, surfaces.area_lights)
+    sieved = _sphere_tree(
+        [s for s in scene.spheres if s.casts_shadows and pierced[row[s.material]]], row, center, scale
+    )
+    sieve = _sieve(surfaces, sieved, vertices, faces, casts & ~whole)
     nbytes = facets.nbytes + tangents.nbytes + surfaces.textures.texels.nbytes + EMBREE_BYTES_A_TRIANGLE * len(faces)
     nbytes += sum(mesh.vertices.nbytes + mesh.faces.nbytes for mesh in scene.meshes)
     brightest = max(itertools.chain(scene.surroundings.zenith, scene.surroundings.horizon,
                                     *(material.emission for material in materials),
                                     *(light.radiance for light in area_lights)))  # fmt: skip
-    return PreparedScene(scene, plan, center, scale, brightest, surfaces, intersector, nbytes)
+    return PreparedScene(scene, plan, center, scale, brightest, surfaces, intersector, nbytes, sieve)
+
+
+def _sphere_tree(
+    spheres: Sequence[Sphere], row: dict[Material, int], center: NDArray[np.float64], scale: float
+) -> SphereTree:
+    """Spheres in scene units."""
+    return build_sphere_tree(
+        (np.array([sphere.center for sphere in spheres]).reshape(-1, 3) - center) * scale,
+        np.array([sphere.radius for sphere in spheres], dtype=np.float64) * scale,
+        np.array([row[sphere.material] for sphere in spheres], dtype=np.int32),
+        np.array([sphere.casts_shadows for sphere in spheres], dtype=np.uint8),
+    )
+
+
+def _sieve(
+    surfaces: Surfaces,
+    spheres: SphereTree,
+    vertices: NDArray[np.float32],
+    faces: NDArray[np.int32],
+    pierced: NDArray[np.bool_],
+) -> Sieve | None:
+    """The cut-out things that cast shadows, by the (m,) bool mask of the triangles; None where there are none."""
+    if not pierced.any() and len(spheres.radius) == 0:
+        return None
+    facets = aligned_facets(int(pierced.sum()))
+    facets[:] = surfaces.facets[pierced]
+    alone = surfaces._replace(facets=facets, spheres=spheres, area_lights=surfaces.area_lights[:0])
+    everything = np.ones(len(facets), dtype=np.bool_)
+    return Sieve(alone, Intersector(vertices, faces[pierced], everything, spheres, alone.area_lights))
 
 
 def _centre_and_scale(scene: Scene) -> tuple[NDArray[np.float64], float]:
@@ -211,9 +263,14 @@ def _material_table(materials: list[Material], picture: dict[Texture, int], plan
         for name in ("diffuse", "specular", "emission", "reflection", "transmission"):
             for channel, value in zip(("red", "green", "blue"), getattr(material, name), strict=True):
                 table[row][f"{name}_{channel}"] = value
-        for name in ("shininess", "ior", "exponent_u", "exponent_v"):
+        for name in ("shininess", "ior", "exponent_u", "exponent_v", "alpha_cutoff"):
             table[row][name] = getattr(material, name)
-        for name, texture in (("picture", material.diffuse_texture), ("specular_picture", material.specular_texture)):
+        holes = material.alpha_texture if "cutouts" in plan.names and has_holes(material) else None
+        for name, texture in (
+            ("picture", material.diffuse_texture),
+            ("specular_picture", material.specular_texture),
+            ("alpha_picture", holes),
+        ):
             table[row][name] = picture.get(texture, -1) if texture else -1
         table[row]["calls"] = calls_of(material, plan)
     return table

@@ -48,6 +48,7 @@ class Texture:
         pixels: (h, w, 3) uint8, sRGB-coded, row 0 at the top; v = 0 is the bottom edge.
         name: for messages.
         wrap_u, wrap_v: `repeat`, `clamp` or `mirror`, across and up.
+        alpha: (h, w) uint8, 255 where it is whole; None for a picture without. Colours are not multiplied by it.
 
     Raises:
         SceneError: for another shape or dtype, or no pixels.
@@ -58,6 +59,12 @@ class Texture:
     name: str = "texture"
     wrap_u: str = "repeat"
     wrap_v: str = "repeat"
+    alpha: NDArray[np.uint8] | None = None
+
+    @property
+    def opacity(self) -> NDArray[np.uint8]:
+        """(h, w) uint8 what it is as an alpha map: its alpha, or where it has none its green channel."""
+        return self.pixels[:, :, 1] if self.alpha is None else self.alpha
 
     def __post_init__(self) -> None:
         require_choice(f"{self.name}: wrap_u", self.wrap_u, WRAPS)
@@ -65,6 +72,11 @@ class Texture:
         if self.pixels.dtype != np.uint8 or self.pixels.ndim != 3 or self.pixels.shape[2] != 3 or self.pixels.size == 0:
             raise SceneError(
                 f"{self.name}: expected (height, width, 3) uint8 pixels, found {self.pixels.shape} {self.pixels.dtype}"
+            )
+        if self.alpha is not None and (self.alpha.dtype != np.uint8 or self.alpha.shape != self.pixels.shape[:2]):
+            raise SceneError(
+                f"{self.name}: expected alpha as {self.pixels.shape[:2]} uint8, "
+                f"found {self.alpha.shape} {self.alpha.dtype}"
             )
 
 
@@ -90,6 +102,9 @@ class Material:
         ior: index of refraction inside the surface relative to outside, 0.1 to 10; 1 goes straight through.
         diffuse_texture: multiplies `diffuse`; None for none.
         specular_texture: multiplies `specular` and `reflection`; None for none.
+        alpha_texture: cuts holes where its alpha (without alpha: its green) is below `alpha_cutoff`; rays of
+            every kind pass them. None for none.
+        alpha_cutoff: 0 to 1.
         base: `phong` or `ashikhmin-shirley`.
         exponent_u, exponent_v: exponents of the highlight of `ashikhmin-shirley` along and across the grain,
             0 to 1e9; the grain runs along the texture coordinate u, round a sphere along its parallels. The
@@ -113,6 +128,8 @@ class Material:
     exponent_u: float = 100.0
     exponent_v: float = 100.0
     specular_texture: Texture | None = None
+    alpha_texture: Texture | None = None
+    alpha_cutoff: float = 0.5
 
     def __post_init__(self) -> None:
         where = f"material {self.name!r}"
@@ -132,6 +149,7 @@ class Material:
         ):
             require_number(f"{where}.{label}", exponent, 0.0, MAX_SHININESS)
         require_number(f"{where}.ior", self.ior, 0.1, 10.0)
+        require_number(f"{where}.alpha_cutoff", self.alpha_cutoff, 0.0, 1.0)
 
 
 @dataclass(frozen=True, eq=False, slots=True)

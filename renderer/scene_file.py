@@ -43,6 +43,8 @@ diffuse = [1.0, 1.0, 1.0]          # or 1 under a texture
 diffuse_texture = "wood.png"
 specular = [0.5, 0.5, 0.5]
 specular_texture = { file = "worn.png", wrap_u = "mirror", wrap_v = "clamp" }  # or repeat
+alpha_texture = "wood.png"         # holes where its alpha (without alpha: its green) is below alpha_cutoff
+alpha_cutoff = 0.5                 # or 0.5
 
 [materials.glass]
 diffuse = [0.0, 0.0, 0.0]
@@ -210,7 +212,7 @@ class _Reader:
         return Scene(tuple(meshes), tuple(spheres), lights, surroundings, camera, exposure, title, camera_path)
 
     def _material(self, fields: Fields, name: str) -> Material:
-        texture, shine = (self._texture(fields, key) for key in ("diffuse_texture", "specular_texture"))
+        texture, shine, holes = (self._texture(fields, f"{kind}_texture") for kind in ("diffuse", "specular", "alpha"))
         base = fields.choice("base", BASES, _DEFAULTS.base)
         brightest = MAX_RADIANCE if base == "phong" else 1.0
         material = Material(
@@ -224,6 +226,8 @@ class _Reader:
             ior=fields.number("ior", 0.1, 10.0, _DEFAULTS.ior),
             diffuse_texture=texture,
             specular_texture=shine,
+            alpha_texture=holes,
+            alpha_cutoff=fields.number("alpha_cutoff", 0.0, 1.0, _DEFAULTS.alpha_cutoff),
             base=base,
             exponent_u=fields.number("exponent_u", 0.0, MAX_SHININESS, _DEFAULTS.exponent_u),
             exponent_v=fields.number("exponent_v", 0.0, MAX_SHININESS, _DEFAULTS.exponent_v),

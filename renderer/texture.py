@@ -104,6 +104,24 @@ def look_up(
 
 
 @formula
+def opacity(texels: NDArray[np.uint32], pictures: NDArray[np.void], row: int, u: float, v: float) -> float:
+    """Bilinear alpha, 0 to 1, at (u, v) of the largest level of a picture.
+
+    Args:
+        texels, pictures: of the atlas.
+        row: of that level among `pictures`.
+    """
+    picture = pictures[row]
+    width, height = picture.width, picture.height
+    left, right, fx = neighbours(within(u, picture.wrap_u) * width, width, picture.wrap_u)
+    top, bottom, fy = neighbours((1.0 - within(v, picture.wrap_v)) * height, height, picture.wrap_v)
+    upper, lower = picture.start + top * width, picture.start + bottom * width
+    above = (1 - fx) * (texels[upper + left] >> 24) + fx * (texels[upper + right] >> 24)
+    below = (1 - fx) * (texels[lower + left] >> 24) + fx * (texels[lower + right] >> 24)
+    return float(((1 - fy) * above + fy * below) / 255.0)
+
+
+@formula
 def level_of(area: float, texels: float) -> float:
     """Level of a picture whose texels are about as large as a footprint; 0 or less where they are larger.
 

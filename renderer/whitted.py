@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.camera import Camera, ViewFrame, view_frame
+from renderer.cutout import cast_through, pass_holes
 from renderer.display import Display
 from renderer.frame import RayCounts
 from renderer.light_samples import LightSamples, seed_samples
@@ -204,6 +205,8 @@ def _shade_batch(
 ) -> NDArray[np.int64]:
     """Trace one batch of rays, add what they see, and leave their children on the next level."""
     hits = prepared.intersector.nearest(batch.origin, batch.direction)
+    if "cutouts" in prepared.plan.names:
+        pass_holes(prepared.surfaces, prepared.intersector, batch.origin, batch.direction, hits)
     counters = scratch.counters
     children = scratch.level(draws.depth + 1)
     shade(
@@ -212,6 +215,9 @@ def _shade_batch(
     pending = int(counters[SHADOWS])
     if pending:
         shadows = first_shadow_rays(scratch.shadows, pending)
+        reach = None if prepared.sieve is None else shadows.reach.copy()
         blocked = prepared.intersector.occluded(shadows.origin, shadows.direction, shadows.reach)
+        if prepared.sieve is not None and reach is not None:
+            cast_through(prepared.sieve, shadows, reach, blocked)
         add_unblocked(shadows, blocked, radiance)
     return counters

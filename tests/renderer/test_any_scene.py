@@ -30,6 +30,7 @@ materials = st.builds(
     exponent_u=st.sampled_from([0.0, 3.0, 1e9]),
     exponent_v=st.sampled_from([0.0, 300.0, 1e9]),
     specular_texture=st.sampled_from([None, Texture(np.uint8([[[0] * 3], [[255] * 3]]), "s", "clamp", "mirror")]),
+    alpha_texture=st.sampled_from([None, Texture(np.uint8([[[0] * 3, [255] * 3]]))]),
     diffuse_texture=st.sampled_from([None, Texture(np.uint8([[[0] * 3, [255] * 3, [9] * 3]]))]),
 )
 spheres = st.builds(

@@ -104,7 +104,15 @@ def test_grey_and_its_transparency() -> None:
 
 def test_transparency_keeps_its_colour() -> None:
     rgba = np.array([[[10, 20, 30, 0], [40, 50, 60, 255]]], dtype=np.uint8)
-    np.testing.assert_array_equal(decode_texture(saved(Image.fromarray(rgba), "png"), "t").pixels, rgba[:, :, :3])
+    found = decode_texture(saved(Image.fromarray(rgba), "png"), "t")
+    np.testing.assert_array_equal(found.pixels, rgba[:, :, :3])
+    np.testing.assert_array_equal(found.opacity, rgba[:, :, 3])
+
+
+def test_an_image_that_is_whole_has_no_alpha() -> None:
+    rgba = np.full((2, 2, 4), 255, dtype=np.uint8)
+    assert decode_texture(saved(Image.fromarray(rgba), "png"), "t").alpha is None
+    assert decode_texture(saved(Image.fromarray(rgba[:, :, :3]), "jpeg"), "t").alpha is None
 
 
 @pytest.mark.parametrize("image_format", ["png", "tiff"])

@@ -25,6 +25,7 @@ from tests.renderer.drawing import WHITE_LAMBERT, floor, glass, light, mirror
 CHECKS = Texture(np.uint8([[[40] * 3, [255] * 3], [[255] * 3, [40] * 3]]), "checks")
 TILES = Material("tiles", diffuse_texture=CHECKS)
 SHINY = Material("shiny", diffuse=(0.3, 0.4, 0.5), specular=(0.6,) * 3)
+LACE = dataclasses.replace(SHINY, alpha_texture=CHECKS)
 PANEL = RectangleLight((-1, 3, -1), (2, 0, 0), (0, 0, 2), (2.0,) * 3)
 KINDS = ("shadow", "reflection", "refraction")
 
@@ -36,7 +37,7 @@ def everything() -> Scene:
         spheres=(
             Sphere((-1.2, 0, 0), 0.8, glass()),
             Sphere((1.2, 0, 0), 0.8, mirror(0.7)),
-            Sphere((0, -0.5, 1.5), 0.5, SHINY),
+            Sphere((0, -0.5, 1.5), 0.5, LACE),
         ),
         lights=(light(3, 4, 3, 40.0), PANEL),
         surroundings=Surroundings((0.2, 0.3, 0.5), (0.5, 0.5, 0.5), (0.1, 0.1, 0.1)),

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
+from PIL import Image
 
 from renderer.framing import DEFAULT_MATERIAL
 from renderer.mesh_file import load_model
@@ -195,6 +196,33 @@ def test_gltf_samplers_say_how_a_texture_goes_on(tmp_path: Path) -> None:
         assert mesh.material.diffuse_texture is not None
         found.append((mesh.material.diffuse_texture.wrap_u, mesh.material.diffuse_texture.wrap_v))
     assert found == [("repeat", "repeat"), ("clamp", "mirror"), ("repeat", "clamp")]
+
+
+@pytest.mark.parametrize(
+    ("stated", "cutoff"),
+    [
+        ({"alphaMode": "MASK"}, 0.5),
+        ({"alphaMode": "MASK", "alphaCutoff": 0.2}, 0.4),
+        ({"alphaMode": "BLEND"}, 0.5),
+        ({}, None),
+    ],
+)
+def test_gltf_alpha_cuts_holes(tmp_path: Path, stated: dict[str, object], cutoff: float | None) -> None:
+    """The cutoff is meant for the texture's alpha times the factor's."""
+    Image.fromarray(np.uint8([[[9, 9, 9, 0], [9, 9, 9, 255]]])).save(tmp_path / "leaf.png")
+    factor = 0.5 if "alphaCutoff" in stated else 1.0
+    pbr = {"baseColorTexture": {"index": 0}, "baseColorFactor": [1, 1, 1, factor]}
+    (mesh,) = load_gltf(
+        tmp_path,
+        images=[{"uri": "leaf.png"}],
+        textures=[{"source": 0}],
+        materials=[{"pbrMetallicRoughness": pbr, **stated}],
+    )
+    if cutoff is None:
+        assert mesh.material.alpha_texture is None
+    else:
+        assert mesh.material.alpha_texture is mesh.material.diffuse_texture
+        assert mesh.material.alpha_cutoff == pytest.approx(cutoff)
 
 
 def test_gltf_textures_from_files_and_buffers(tmp_path: Path) -> None:

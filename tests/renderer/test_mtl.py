@@ -139,6 +139,9 @@ def test_maps_of_highlights_and_maps_that_are_clamped(tmp_path: Path) -> None:
     assert (shiny.specular_texture.wrap_u, shiny.specular_texture.wrap_v) == ("clamp", "clamp")
     assert shiny.diffuse_texture.wrap_u == "repeat"
     assert shiny.reflection == (1.0, 1.0, 1.0)
+    holes = material(tmp_path, "map_d a.png")
+    assert holes.alpha_texture is not None
+    assert holes.alpha_texture.opacity.tolist() == [[20]]
     assert material(tmp_path, "Ks 0.5 0.5 0.5\nmap_Ks a.png").specular == pytest.approx((0.5 / math.pi,) * 3)
 
 

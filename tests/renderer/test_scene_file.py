@@ -106,6 +106,7 @@ def test_the_worked_example_shows_every_field(folder: Path) -> None:
     assert fields | {"emission"} == {
         "diffuse", "specular", "shininess", "emission", "reflection", "transmission", "ior", "diffuse_texture",
         "base", "exponent_u", "exponent_v", "specular_texture",
+        "alpha_texture", "alpha_cutoff",
     }  # fmt: skip
 
 
@@ -135,6 +136,8 @@ def test_textures_and_how_they_go_on(folder: Path) -> None:
     assert wood.diffuse_texture is not None
     assert wood.specular_texture is not None
     assert (wood.diffuse_texture.wrap_u, wood.diffuse_texture.wrap_v) == ("repeat", "repeat")
+    assert wood.alpha_texture is wood.diffuse_texture
+    assert wood.alpha_cutoff == 0.5
     assert (wood.specular_texture.wrap_u, wood.specular_texture.wrap_v) == ("mirror", "clamp")
 
 
@@ -231,7 +234,10 @@ RECTANGLE = "[[light]]\nkind = 'rectangle'\ncorner = [0, 0, 0]\nradiance = [1, 1
             "[materials.red]\ndiffuse = [2, 0, 0]",
             "vase/scene.toml: materials.red.diffuse[0]: expected a number in [0, 1]",
         ),
-        ("[materials.red]\ncolor = 1", "vase/scene.toml: materials.red.color: expected one of the fields base, "),
+        (
+            "[materials.red]\ncolor = 1",
+            "vase/scene.toml: materials.red.color: expected one of the fields alpha_cutoff, ",
+        ),
         (
             "[materials.red]\nbase = 'lambert'",
             "vase/scene.toml: materials.red.base: expected one of phong, ashikhmin-shirley, found 'lambert'",
