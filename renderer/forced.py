@@ -1,8 +1,7 @@
 """A prepared scene with effects forced on or off, sharing everything else with the scene it comes from.
 
 Forced on, `shadows` and `soft_shadows` make every light and every object cast them, whatever the author
-says, and cut-outs cast whole ones; any other effect runs on every surface and, where nothing calls for it,
-brings nothing but its cost.
+says; any other effect runs on every surface and, where nothing calls for it, brings nothing but its cost.
 """
 
 from __future__ import annotations
@@ -15,7 +14,8 @@ import numpy as np
 from renderer.atlas import build_atlas
 from renderer.effect_choice import EffectChoice
 from renderer.effects import forced_plan, pictures_of
-from renderer.prepared import PreparedScene, calls_of, used_materials
+from renderer.intersection import Intersector
+from renderer.prepared import PreparedScene, Sieve, calls_of, prepare, used_materials
 from renderer.scene import Texture
 
 MOST_VARIANTS = 8
@@ -63,9 +63,9 @@ def _forced(prepared: PreparedScene, choice: EffectChoice) -> PreparedScene:
             table["casts"] = 0
         elif effect in plan.forced:
             table["casts"] = 1
-    if plan.forced & {"shadows", "soft_shadows"}:
-        intersector = intersector.all_casting()
     sieve = prepared.sieve
+    if plan.forced & {"shadows", "soft_shadows"}:
+        intersector, sieve = _all_casting(prepared)
     if sieve is not None:
         sieve = sieve._replace(surfaces=sieve.surfaces._replace(materials=materials, textures=textures))
     return dataclasses.replace(
@@ -76,3 +76,14 @@ def _forced(prepared: PreparedScene, choice: EffectChoice) -> PreparedScene:
         sieve=sieve,
         variants={},
     )
+
+
+def _all_casting(prepared: PreparedScene) -> tuple[Intersector, Sieve | None]:
+    """What answers rays where everything casts shadows."""
+    if "cutouts" not in prepared.plan.names:
+        return prepared.intersector.all_casting(), None
+    scene = prepared.scene
+    meshes = tuple(dataclasses.replace(mesh, casts_shadows=True) for mesh in scene.meshes)
+    spheres = tuple(dataclasses.replace(sphere, casts_shadows=True) for sphere in scene.spheres)
+    casting = prepare(dataclasses.replace(scene, meshes=meshes, spheres=spheres))
+    return casting.intersector, casting.sieve
