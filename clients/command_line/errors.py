@@ -18,6 +18,10 @@ class UsageError(Exception):
     """A command line that cannot be carried out; the message is one line."""
 
 
+class CommandFailed(Exception):
+    """What was asked for could not be done, by no fault of the command line; the message is one line."""
+
+
 BAD_INPUTS = (UsageError, RenderError, GazeTraceError)
 """What the user can mend by other input; their messages are one line fit to show."""
 
@@ -29,7 +33,7 @@ def exit_code(error: Exception) -> int:
 
 def one_line(error: Exception) -> str:
     """What happened, on one line: our own errors as they are, the system's with the file they are about."""
-    if isinstance(error, BAD_INPUTS):
+    if isinstance(error, (*BAD_INPUTS, CommandFailed)):
         text = str(error)
     elif isinstance(error, OSError) and error.strerror:
         text = f"{error.filename}: {error.strerror}" if error.filename else error.strerror

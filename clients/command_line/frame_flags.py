@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import re
 from dataclasses import replace
+from typing import Any
 
 from clients.command_line.errors import blame_flag
 from renderer.acuity import ECCENTRICITIES, MODELS, Acuity
@@ -198,14 +199,19 @@ def quality_of(arguments: argparse.Namespace) -> Quality:
     )
 
 
-def _camera_of(arguments: argparse.Namespace, scene_camera: Camera) -> Camera | None:
+def camera_changes(arguments: argparse.Namespace) -> dict[str, Any]:
+    """What the flags say of the camera."""
     stated = {
         "position": arguments.camera_position,
         "look_at": arguments.camera_look_at,
         "up": arguments.camera_up,
         "vertical_fov_deg": arguments.camera_fov,
     }
-    changes = {name: value for name, value in stated.items() if value is not None}
+    return {name: value for name, value in stated.items() if value is not None}
+
+
+def _camera_of(arguments: argparse.Namespace, scene_camera: Camera) -> Camera | None:
+    changes = camera_changes(arguments)
     return replace(scene_camera, **changes) if changes else None
 
 
