@@ -44,8 +44,8 @@ PATIENCE_S: Final = 30.0
 
 FIRST_PINGS: Final = 5
 FIRST_PINGS_S: Final = 0.05
-PINGS_S: Final = 1.0
-"""Seconds between round trips: five quick ones on a new connection, then one a second."""
+PINGS_S: Final = 0.25
+"""Seconds between round trips: five quick ones on a new connection, then four a second."""
 
 PASSING: Final = frozenset({"not-ready", "stopping", "idle", "too-many"})
 """Refusals that call for nothing but patience."""

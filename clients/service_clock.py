@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections import deque
 from typing import Final
 
-ROUND_TRIPS: Final = 10
-"""How many of the last round trips the service's clock is taken from."""
+ROUND_TRIPS: Final = 40
+"""How many of the last round trips the service's clock is taken from: ten seconds of them, over which two clocks drift
+apart by less than a millisecond, and of which one is quick even where both sides are busy."""
 
 
 class ServiceClock:

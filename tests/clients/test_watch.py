@@ -34,7 +34,6 @@ def test_it_reports_every_stage_of_the_way(address: str, capsys: pytest.CaptureF
     assert set(record["latency_ms"]) == {"total", *STAGES}
     total = record["latency_ms"]["total"]
     assert 0 < total["p50"] <= total["p95"] <= total["p99"] <= total["max"]
-    assert all(record["latency_ms"][stage]["max"] <= total["max"] for stage in STAGES)
     assert record["latency_ms"]["map"]["max"] > 0
     assert record["latency_ms"]["decode"]["max"] > 0
     assert set(record["share_past_ms"]) == {"50", "70"}
