@@ -30,7 +30,7 @@ class SphereTree(NamedTuple):
         radius: (k,) float64.
         material: (k,) int32.
         casts: (k,) uint8, 1 where the sphere casts shadows.
-        low, high: (nodes, 3) float64 boxes; node 0 is the root.
+        box: (nodes, 6) float64 lower and upper corner of each node's box; node 0 is the root.
         first: (nodes,) int32 first sphere of a leaf, or the left child of an inner node, whose right
             child follows it.
         length: (nodes,) int32 spheres of a leaf, 0 for an inner node.
@@ -40,8 +40,7 @@ class SphereTree(NamedTuple):
     radius: NDArray[np.float64]
     material: NDArray[np.int32]
     casts: NDArray[np.uint8]
-    low: NDArray[np.float64]
-    high: NDArray[np.float64]
+    box: NDArray[np.float64]
     first: NDArray[np.int32]
     length: NDArray[np.int32]
 
@@ -91,8 +90,7 @@ def build_sphere_tree(
         radius=radius[sorted_spheres],
         material=material[sorted_spheres],
         casts=casts[sorted_spheres],
-        low=np.array(lows),
-        high=np.array(highs),
+        box=np.concatenate((lows, highs), axis=1),
         first=np.array(first, dtype=np.int32),
         length=np.array(count, dtype=np.int32),
     )
@@ -124,16 +122,7 @@ def hit_distance(
 
 @formula
 def _box_entry(
-    ox: float,
-    oy: float,
-    oz: float,
-    ix: float,
-    iy: float,
-    iz: float,
-    low: NDArray[np.float64],
-    high: NDArray[np.float64],
-    node: int,
-    limit: float,
+    ox: float, oy: float, oz: float, ix: float, iy: float, iz: float, box: NDArray[np.float64], node: int, limit: float
 ) -> float:
     """Where a ray enters a node's box, infinity if it misses it or enters beyond `limit`.
 
@@ -144,7 +133,7 @@ def _box_entry(
     for axis in range(3):
         o = ox if axis == 0 else (oy if axis == 1 else oz)
         i = ix if axis == 0 else (iy if axis == 1 else iz)
-        near, far = (low[node, axis] - o) * i, (high[node, axis] - o) * i
+        near, far = (box[node, axis] - o) * i, (box[node, axis + 3] - o) * i
         if near > far:
             near, far = far, near
         if near > enter:
@@ -152,6 +141,58 @@ def _box_entry(
         if far < leave:
             leave = far
     return enter if enter <= leave else math.inf
+
+
+@formula
+def _next_leaf(
+    box: NDArray[np.float64],
+    firsts: NDArray[np.int32],
+    lengths: NDArray[np.int32],
+    ox: float,
+    oy: float,
+    oz: float,
+    ix: float,
+    iy: float,
+    iz: float,
+    limit: float,
+    nodes: NDArray[np.int32],
+    entries: NDArray[np.float64],
+    pending: int,
+) -> tuple[int, int]:
+    """Go on to the next leaf that a ray enters before `limit`, the nearer child of a node first.
+
+    Args:
+        box, firsts, lengths: of the tree.
+        ox, oy, oz, ix, iy, iz: origin and reciprocal direction of the ray.
+        limit: how far to look.
+        nodes, entries: (STACK_SIZE,) nodes to be visited and where the ray enters them, the last one next.
+        pending: how many there are.
+
+    Returns:
+        The leaf, or -1, and how many nodes are pending then.
+    """
+    while pending > 0:
+        pending -= 1
+        node = nodes[pending]
+        if entries[pending] > limit:
+            continue
+        while lengths[node] == 0:
+            near = firsts[node]
+            far = near + 1
+            entry = _box_entry(ox, oy, oz, ix, iy, iz, box, near, limit)
+            other = _box_entry(ox, oy, oz, ix, iy, iz, box, far, limit)
+            if other < entry:
+                near, far, entry, other = far, near, other, entry
+            if entry == math.inf:
+                node = -1
+                break
+            if other < math.inf:
+                nodes[pending], entries[pending] = far, other
+                pending += 1
+            node = near
+        if node >= 0:
+            return node, pending
+    return -1, 0
 
 
 @roomy_kernel
@@ -172,29 +213,22 @@ def nearest_spheres(
         distance: (n,) float32 distance of the nearest hit so far, in lengths of the direction.
         primitive: (n,) int32 what was hit, -1 for nothing.
     """
-    low, high, firsts, counts = tree.low, tree.high, tree.first, tree.length
+    box, firsts, lengths = tree.box, tree.first, tree.length
     centers, radii = tree.center, tree.radius
-    stack = np.zeros(STACK_SIZE, dtype=np.int32)
+    nodes, entries = np.zeros(STACK_SIZE, dtype=np.int32), np.zeros(STACK_SIZE)
     for ray in range(len(distance)):
         ox, oy, oz = np.float64(origin[ray, 0]), np.float64(origin[ray, 1]), np.float64(origin[ray, 2])
         dx, dy, dz = np.float64(direction[ray, 0]), np.float64(direction[ray, 1]), np.float64(direction[ray, 2])
         ix, iy, iz = 1.0 / dx, 1.0 / dy, 1.0 / dz
         best = np.float64(distance[ray]) if primitive[ray] >= 0 else math.inf
         found = -1
-        stack[0] = 0
-        depth = min(1, len(radii))
-        while depth > 0:
-            depth -= 1
-            node = stack[depth]
-            if _box_entry(ox, oy, oz, ix, iy, iz, low, high, node, best) == math.inf:
-                continue
-            start = firsts[node]
-            if counts[node] == 0:
-                stack[depth] = start + 1
-                stack[depth + 1] = start
-                depth += 2
-                continue
-            for sphere in range(start, start + counts[node]):
+        nodes[0], entries[0] = 0, _box_entry(ox, oy, oz, ix, iy, iz, box, 0, best)
+        leaf, pending = 0, min(1, len(radii))
+        while True:
+            leaf, pending = _next_leaf(box, firsts, lengths, ox, oy, oz, ix, iy, iz, best, nodes, entries, pending)
+            if leaf < 0:
+                break
+            for sphere in range(firsts[leaf], firsts[leaf] + lengths[leaf]):
                 cx, cy, cz = centers[sphere, 0], centers[sphere, 1], centers[sphere, 2]
                 t = hit_distance(ox, oy, oz, dx, dy, dz, cx, cy, cz, radii[sphere])
                 if t < best:
@@ -221,9 +255,9 @@ def shade_spheres(
         reach: (n,) float32 distance of the light, in lengths of the direction.
         blocked: (n,) uint8, set to 1 where a sphere stands before the light; rays already 1 are skipped.
     """
-    low, high, firsts, counts = tree.low, tree.high, tree.first, tree.length
+    box, firsts, lengths = tree.box, tree.first, tree.length
     centers, radii, casts = tree.center, tree.radius, tree.casts
-    stack = np.zeros(STACK_SIZE, dtype=np.int32)
+    nodes, entries = np.zeros(STACK_SIZE, dtype=np.int32), np.zeros(STACK_SIZE)
     for ray in range(len(reach)):
         if blocked[ray] != 0:
             continue
@@ -231,20 +265,13 @@ def shade_spheres(
         dx, dy, dz = np.float64(direction[ray, 0]), np.float64(direction[ray, 1]), np.float64(direction[ray, 2])
         ix, iy, iz = 1.0 / dx, 1.0 / dy, 1.0 / dz
         limit = np.float64(reach[ray])
-        stack[0] = 0
-        depth = min(1, len(radii))
-        while depth > 0 and blocked[ray] == 0:
-            depth -= 1
-            node = stack[depth]
-            if _box_entry(ox, oy, oz, ix, iy, iz, low, high, node, limit) == math.inf:
-                continue
-            start = firsts[node]
-            if counts[node] == 0:
-                stack[depth] = start + 1
-                stack[depth + 1] = start
-                depth += 2
-                continue
-            for sphere in range(start, start + counts[node]):
+        nodes[0], entries[0] = 0, _box_entry(ox, oy, oz, ix, iy, iz, box, 0, limit)
+        leaf, pending = 0, min(1, len(radii))
+        while blocked[ray] == 0:
+            leaf, pending = _next_leaf(box, firsts, lengths, ox, oy, oz, ix, iy, iz, limit, nodes, entries, pending)
+            if leaf < 0:
+                break
+            for sphere in range(firsts[leaf], firsts[leaf] + lengths[leaf]):
                 cx, cy, cz = centers[sphere, 0], centers[sphere, 1], centers[sphere, 2]
                 t = hit_distance(ox, oy, oz, dx, dy, dz, cx, cy, cz, radii[sphere])
                 if t < limit and casts[sphere] != 0:
