@@ -15,7 +15,7 @@ from renderer.acuity import MAX_SCALE, Acuity
 from renderer.frame import FrameRequest
 from renderer.pace import Rates
 from renderer.quality import Quality
-from renderer.store import Samples, held_by_number
+from renderer.store import SampleStore, held_by_number
 
 NS_PER_MS = 1_000_000
 
@@ -55,14 +55,14 @@ def fitted(request: FrameRequest, works: Iterable[Work], rates: Rates) -> FrameR
 
 
 def affordable_samples(
-    request: FrameRequest, slots: NDArray[np.int64], samples: Samples, wanted: int, rates: Rates, gone_ns: int
+    request: FrameRequest, slots: NDArray[np.int64], store: SampleStore, wanted: int, rates: Rates, gone_ns: int
 ) -> int:
     """As many of `wanted` samples a cell as should be traced by the deadline, if there is any.
 
     Args:
         request: the frame.
         slots: (n,) int64 slots of its cells.
-        samples: what they hold.
+        store: what they hold.
         wanted: most samples a cell.
         rates: time for each part.
         gone_ns: since the frame was begun [ns].
@@ -70,7 +70,7 @@ def affordable_samples(
     deadline_ms = request.quality.deadline_ms
     if deadline_ms is None:
         return wanted
-    held = held_by_number(samples.number, slots, wanted)
+    held = held_by_number(store.samples.number, store.spread.settled, slots, wanted)
     return choose_samples(held, wanted, request.display.pixels, rates, NS_PER_MS * deadline_ms - gone_ns)
 
 

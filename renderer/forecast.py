@@ -21,14 +21,20 @@ PROBES_DOWN = 36
 
 
 def forecast_held(
-    display: Display, acuity: Acuity, bucket: GazeBucket, number: NDArray[np.int32], wanted: int
+    display: Display,
+    acuity: Acuity,
+    bucket: GazeBucket,
+    number: NDArray[np.int32],
+    settled: NDArray[np.uint8],
+    wanted: int,
 ) -> NDArray[np.float64]:
     """Cells of an aligned map by the number of samples they hold; a scanline map has about as many.
 
     Args:
         display, acuity, bucket: the screen, the eye and where it looks.
         number: (slots,) int32 samples in each slot of the view's store, empty if nothing was traced yet.
-        wanted: samples a cell needs, 1 or more.
+        settled: (slots,) uint8, 1 for a cell that needs no more; empty if there is none.
+        wanted: samples a cell needs unless it is settled, 1 or more.
 
     Returns:
         (wanted + 1,) float64.
@@ -37,7 +43,7 @@ def forecast_held(
     sides, starts = aligned_levels(display.width_px, display.height_px)
     eye = eye_geometry(display, acuity, bucket)
     across, down = min(PROBES_ACROSS, display.width_px), min(PROBES_DOWN, display.height_px)
-    _probe(eye, sides, starts, number, across, down, held)
+    _probe(eye, sides, starts, number, settled, across, down, held)
     return held
 
 
@@ -47,6 +53,7 @@ def _probe(
     sides: NDArray[np.int32],
     starts: NDArray[np.int64],
     number: NDArray[np.int32],
+    settled: NDArray[np.uint8],
     across: int,
     down: int,
     held: NDArray[np.float64],
@@ -66,7 +73,8 @@ def _probe(
             side = int(sides[level])
             known = 0
             if len(number) > 0:
-                known = min(most, number[starts[level] + (py // side) * -(-width // side) + px // side])
+                slot = starts[level] + (py // side) * -(-width // side) + px // side
+                known = most if len(settled) > 0 and settled[slot] != 0 else min(most, number[slot])
             held[known] += area / (side * side)
 
 

@@ -8,11 +8,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.adaptive import UNSURE, Squares, Verdicts, neighbours_lacking
 from renderer.cellmap import CellMap
 from renderer.frame import RayCounts
 from renderer.prepared import PreparedScene
 from renderer.quality import Quality
-from renderer.store import Samples, add_samples, missing_cells
+from renderer.store import FIRST_ROUND, SampleStore, add_samples, missing_cells
 from renderer.whitted import Cells, View, block_rays, trace_cells
 from renderer.workers import Workers
 
@@ -21,7 +22,9 @@ class Growth(NamedTuple):
     """What was traced for a frame.
 
     Attributes:
-        cells, samples: cells that got samples, and how many in all.
+        cells: cells of the frame that got samples.
+        samples: samples traced, with those that only helped to decide about others.
+        asked: samples that would have been traced if no cell had settled for less.
         rays: by kind.
         rejected: samples that were no light.
         held: samples that all cells of the frame have now.
@@ -31,6 +34,7 @@ class Growth(NamedTuple):
 
     cells: int
     samples: int
+    asked: int
     rays: RayCounts
     rejected: int
     held: int
@@ -38,24 +42,65 @@ class Growth(NamedTuple):
     trace_ns: int
 
 
+class _Tracer:
+    """Traces samples of cells and counts what that takes."""
+
+    def __init__(
+        self, prepared: PreparedScene, view: View, store: SampleStore, quality: Quality, pool: Workers
+    ) -> None:
+        self._scene = (prepared, view)
+        self._store = store
+        self._quality = quality
+        self._pool = pool
+        self.samples = 0
+        self.trace_ns = 0
+        self.rejected = 0
+        self.rays = RayCounts()
+
+    def trace(
+        self, squares: Squares, chosen: NDArray[np.int32], first: NDArray[np.int32], until: NDArray[np.int32]
+    ) -> int:
+        """Trace samples first .. until - 1 of each of the `chosen` squares; return how many these are."""
+        prepared, view = self._scene
+        samples, spread = self._store.samples, self._store.spread
+        starts = block_starts(until - first, block_rays(prepared, self._quality))
+        counts = [RayCounts()] * (len(starts) - 1)
+        rejected = [0] * (len(starts) - 1)
+
+        def trace_block(block: int) -> None:
+            part = slice(starts[block], starts[block + 1])
+            some = Cells(squares.x, squares.y, squares.side, chosen[part], first[part], until[part])
+            radiance, counts[block] = trace_cells(prepared, view, some, self._quality)
+            rejected[block] = add_samples(samples, spread, squares.slots, some.chosen, some.until, radiance)
+
+        began = time.perf_counter_ns()
+        self._pool.run(trace_block, len(counts))
+        self.trace_ns += time.perf_counter_ns() - began
+        traced = int((until - first).sum())
+        self.samples += traced
+        self.rays = total_rays([self.rays, *counts])
+        self.rejected += sum(rejected)
+        return traced
+
+
 def grow(
     prepared: PreparedScene,
     view: View,
     cell_map: CellMap,
     slots: NDArray[np.int64],
-    samples: Samples,
+    store: SampleStore,
     quality: Quality,
     wanted: int,
     pool: Workers,
 ) -> Growth:
-    """Trace what the cells of a map lack of `wanted` samples each, and add it to `samples`.
+    """Trace what the cells of a map lack of `wanted` samples each, and add it to `store`.
 
     Args:
         prepared, view: the scene and the camera.
-        cell_map, slots: the cells and their slots in `samples`.
-        samples: what was traced before; every block that was begun is added whole.
+        cell_map, slots: the cells and their slots in `store`.
+        store: what was traced before; every block that was begun is added whole.
         quality: samples a cell gets in the end, antialiasing and depth.
-        wanted: samples a cell is to have now.
+        wanted: samples a cell is to have now; `adaptive` lets it settle for less.
         pool: threads; what is added does not depend on their number.
 
     Raises:
@@ -63,24 +108,51 @@ def grow(
     """
     found = np.zeros(cell_map.cells, dtype=np.int32)
     had = np.zeros(cell_map.cells, dtype=np.int32)
-    missing, held, fewest = missing_cells(samples, slots, wanted, found, had)
+    missing, held, fewest = missing_cells(store.samples, store.spread, slots, wanted, found, had)
     chosen, first = found[:missing], had[:missing]
-    until = np.full(missing, wanted, dtype=np.int32)
-    starts = block_starts(until - first, block_rays(prepared, quality))
-    counts = [RayCounts()] * (len(starts) - 1)
-    rejected = [0] * (len(starts) - 1)
+    asked = wanted * missing - int(first.sum())
+    tracer = _Tracer(prepared, view, store, quality, pool)
+    squares = Squares(cell_map.x, cell_map.y, cell_map.side, slots)
+    if quality.antialiasing == "adaptive":
+        verdicts = Verdicts(cell_map, slots, store, prepared.scene.exposure, pool)
+        missing, traced = _trace_rounds(tracer, verdicts, squares, chosen, wanted)
+        least = min(wanted, FIRST_ROUND)
+    else:
+        traced = tracer.trace(squares, chosen, first, np.full(missing, wanted, dtype=np.int32))
+        least = wanted
+    return Growth(
+        missing, tracer.samples, asked, tracer.rays, tracer.rejected, held + traced, max(fewest, least), tracer.trace_ns
+    )
 
-    def trace(block: int) -> None:
-        part = slice(starts[block], starts[block + 1])
-        some = Cells(cell_map.x, cell_map.y, cell_map.side, chosen[part], first[part], until[part])
-        radiance, counts[block] = trace_cells(prepared, view, some, quality)
-        rejected[block] = add_samples(samples, slots, some.chosen, some.until, radiance)
 
-    began = time.perf_counter_ns()
-    pool.run(trace, len(counts))
-    trace_ns = time.perf_counter_ns() - began
-    traced = int((until - first).sum())
-    return Growth(missing, traced, total_rays(counts), sum(rejected), held + traced, max(fewest, wanted), trace_ns)
+def _trace_rounds(
+    tracer: _Tracer, verdicts: Verdicts, squares: Squares, chosen: NDArray[np.int32], wanted: int
+) -> tuple[int, int]:
+    """Trace round after round until every cell is settled or has `wanted` samples.
+
+    Returns:
+        how many of the `chosen` cells got samples, and how many samples these were.
+    """
+    number = verdicts.number
+    begun = number[squares.slots[chosen]]
+    fresh = begun < FIRST_ROUND
+    once = np.full(np.count_nonzero(fresh), min(wanted, FIRST_ROUND), dtype=np.int32)
+    traced = tracer.trace(squares, chosen[fresh], begun[fresh], once)
+    got = np.zeros(len(squares.x), dtype=np.bool_)
+    got[chosen[fresh]] = True
+    while len(chosen := chosen[number[squares.slots[chosen]] < wanted]):
+        until, unsure = verdicts.next_round(chosen, wanted)
+        if len(unsure):
+            beside = neighbours_lacking(squares, unsure, verdicts.shape, number)
+            everyone = np.arange(len(beside.x), dtype=np.int32)
+            tracer.trace(beside, everyone, number[beside.slots], np.full_like(everyone, FIRST_ROUND))
+            until[until == UNSURE], _ = verdicts.next_round(unsure, wanted)
+        first = number[squares.slots[chosen]]
+        going_on = until > first
+        chosen = chosen[going_on]
+        traced += tracer.trace(squares, chosen, first[going_on], until[going_on])
+        got[chosen] = True
+    return int(got.sum()), traced
 
 
 def block_starts(samples: NDArray[np.int32], block: int) -> list[int]:

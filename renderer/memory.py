@@ -64,7 +64,9 @@ class Memory:
     def store(self, prepared: PreparedScene, request: FrameRequest, numbered: NumberedMap) -> SampleStore:
         """The samples of a view: shared by all its aligned and full maps, but a scanline map has its own."""
         key = _store_key(prepared, request, numbered)
-        return self.stores.get(key, lambda: SampleStore(slots_needed(numbered.cells)))[0]
+        return self.stores.get(
+            key, lambda: SampleStore(slots_needed(numbered.cells), request.quality.antialiasing == "adaptive")
+        )[0]
 
     def works(self, prepared: PreparedScene, request: FrameRequest, wanted: int) -> Iterator[Work]:
         """What the frame takes with each acuity, finest first: maps that are there are counted, others forecast.
@@ -78,12 +80,14 @@ class Memory:
             quality = replace(request.quality, acuity=acuity)
             numbered = self.maps.peek(_map_key(display, quality, request.gaze))
             store = self.stores.peek(_store_key(prepared, request, numbered))
-            number = np.zeros(0, dtype=np.int32) if store is None else store.samples.number
+            if store is None:
+                store = SampleStore(0)
+            number, settled = store.samples.number, store.spread.settled
             if numbered is None:
                 bucket = _bucket(quality, request.gaze)
-                yield Work(acuity, True, forecast_held(display, acuity, bucket, number, wanted))
+                yield Work(acuity, True, forecast_held(display, acuity, bucket, number, settled, wanted))
             else:
-                yield Work(acuity, False, held_by_number(number, numbered.slots, wanted))
+                yield Work(acuity, False, held_by_number(number, settled, numbered.slots, wanted))
 
 
 def _bucket(quality: Quality, gaze: Gaze) -> GazeBucket:

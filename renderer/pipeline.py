@@ -94,10 +94,11 @@ class Renderer:
         cells, slots = numbered.cells, numbered.slots
         mapped = time.perf_counter_ns()
         view = view_of(prepared, request.camera or prepared.scene.camera, request.display)
-        with self._memory.store(prepared, request, numbered).held(abandon) as samples:
+        store = self._memory.store(prepared, request, numbered)
+        with store.held(abandon) as samples:
             entered = time.perf_counter_ns()
-            wanted = affordable_samples(request, slots, samples, wanted, rates, entered - began)
-            growth = grow(prepared, view, cells, slots, samples, quality, wanted, pool)
+            wanted = affordable_samples(request, slots, store, wanted, rates, entered - began)
+            growth = grow(prepared, view, cells, slots, store, quality, wanted, pool)
             done = time.perf_counter_ns()
             rebuild = reconstruct_smooth if quality.reconstruction == "smooth" else reconstruct
             pixels = rebuild(cells, slots, samples, prepared.scene.exposure, request.linear, pool)
@@ -108,9 +109,7 @@ class Renderer:
             )
         finished = time.perf_counter_ns()
         frame_ns = finished - entered - growth.trace_ns
-        self._pace.learn(
-            prepared, request, None if cached else mapped - began, frame_ns, growth.trace_ns, growth.samples
-        )
+        self._pace.learn(prepared, request, None if cached else mapped - began, frame_ns, growth.trace_ns, growth.asked)
         cost = FrameCost(
             map=quality.map,
             cells=cells.cells,
@@ -146,6 +145,7 @@ class Renderer:
                 for reconstruction in RECONSTRUCTIONS:
                     quality = Quality(map=kind, samples_per_cell=2, reconstruction=reconstruction)
                     self.render(scene, FrameRequest(Gaze(1e4, 16.0), display, None, quality, linear))
-        self.render(scene, FrameRequest(Gaze(0.0, 0.0), display, None, Quality(deadline_ms=1.0)))
+        for quality in (Quality(deadline_ms=1.0), Quality(antialiasing="adaptive", samples_per_cell=8)):
+            self.render(scene, FrameRequest(Gaze(0.0, 0.0), display, None, quality))
         eccentricity_deg(display, Gaze(0.0, 0.0))
         self._pace = Pace(self.threads)

@@ -9,7 +9,7 @@ from renderer.effect_choice import EffectChoice, require_effect_choice
 from renderer.errors import require_choice, require_integer, require_number
 
 MAPS = ("aligned", "scanline", "full")
-ANTIALIASING = ("stochastic", "regular")
+ANTIALIASING = ("stochastic", "regular", "adaptive")
 RECONSTRUCTIONS = ("nearest", "smooth")
 MAX_SAMPLES = 4096
 MAX_DEPTH = 64
@@ -27,7 +27,8 @@ class Quality:
         gaze_bucket_px: side of the squares of gaze that share a map [px], 0 for the exact gaze.
         samples_per_cell: rays sent from the camera for each cell, 1 to 4096.
         antialiasing: where they go: the first to the cell's centre, the rest at `stochastic` or
-            `regular` places over the cell's area.
+            `regular` places over the cell's area; `adaptive` is stochastic, and a cell gets `samples_per_cell`
+            only where fewer leave an error that can be seen.
         shadow_samples: shadow rays a cell sends to each area light, 1 to 4096, spread over its camera
             samples: each sends shadow_samples / samples_per_cell of them, rounded up.
         max_depth: how many mirrors and boundaries a ray may meet, 0 to 64.

@@ -25,8 +25,8 @@ LUMINANCE = (0.2126, 0.7152, 0.0722)
 BRIGHTEST = np.float32(1e16)
 """Radiance beyond which a sample is cut, so that 4096 of their squares fit in float32."""
 
-BYTES_A_SLOT = 3 * 4 + 4 + 4
-"""Size of one cell's record [byte]."""
+FIRST_ROUND = 4
+"""Samples that every cell gets before it is decided which ones get more."""
 
 ABANDON_POLL_S = 0.005
 """How often whoever waits for a store looks whether to go on waiting [s]."""
@@ -46,12 +46,31 @@ class Samples(NamedTuple):
     number: NDArray[np.int32]
 
 
+class Spread(NamedTuple):
+    """What decides whether cells get more samples, one slot each; without slots where all get equally many.
+
+    Attributes:
+        low, high: (n,) float32 least and greatest luminance among the first `FIRST_ROUND` samples.
+        settled: (n,) uint8: 1 for a cell that needs no more samples.
+    """
+
+    low: NDArray[np.float32]
+    high: NDArray[np.float32]
+    settled: NDArray[np.uint8]
+
+
 class SampleStore:
     """Samples of one view, for one render at a time."""
 
-    def __init__(self, slots: int) -> None:
+    def __init__(self, slots: int, adaptive: bool = False) -> None:
         """Room for `slots` cells; memory is taken from the system only where it is written."""
         self._lock = threading.Lock()
+        decided = slots if adaptive else 0
+        self.spread = Spread(
+            low=np.zeros(decided, dtype=np.float32),
+            high=np.zeros(decided, dtype=np.float32),
+            settled=np.zeros(decided, dtype=np.uint8),
+        )
         self.samples = Samples(
             total=np.zeros((slots, 3), dtype=np.float32),
             square=np.zeros(slots, dtype=np.float32),
@@ -76,7 +95,7 @@ class SampleStore:
     @property
     def nbytes(self) -> int:
         """Size in memory when every slot is in use."""
-        return len(self.samples.number) * BYTES_A_SLOT
+        return sum(array.nbytes for array in (*self.samples, *self.spread))
 
 
 def aligned_sides(width: int, height: int) -> NDArray[np.int32]:
@@ -138,12 +157,17 @@ def _find_slots(
 
 @kernel
 def missing_cells(
-    samples: Samples, slots: NDArray[np.int64], wanted: int, missing: NDArray[np.int32], first: NDArray[np.int32]
+    samples: Samples,
+    spread: Spread,
+    slots: NDArray[np.int64],
+    wanted: int,
+    missing: NDArray[np.int32],
+    first: NDArray[np.int32],
 ) -> tuple[int, int, int]:
-    """List the cells that have fewer than `wanted` samples.
+    """List the cells that have fewer than `wanted` samples and are not settled.
 
     Args:
-        samples: the store.
+        samples, spread: the store.
         slots: (n,) int64 slot of each cell.
         wanted: samples a cell.
         missing: (n,) int32, the first of them written: the cells.
@@ -152,46 +176,54 @@ def missing_cells(
     Returns:
         How many are missing, how many samples there are in all cells, and the fewest in any.
     """
-    count = samples.number
+    count, settled = samples.number, spread.settled
     found = held = 0
     fewest = np.int32(2**31 - 1)
     for cell in range(len(slots)):
         number = count[slots[cell]]
         held += number
         fewest = min(fewest, number)
-        if number < wanted:
+        if number < wanted and (len(settled) == 0 or settled[slots[cell]] == 0):
             missing[found] = cell
             first[found] = number
             found += 1
     return found, held, int(fewest)
 
 
-def held_by_number(number: NDArray[np.int32], slots: NDArray[np.int64], most: int) -> NDArray[np.float64]:
-    """Cells by the number of samples they hold, (most + 1,) float64; those with more than `most` count as of `most`.
+def held_by_number(
+    number: NDArray[np.int32], settled: NDArray[np.uint8], slots: NDArray[np.int64], most: int
+) -> NDArray[np.float64]:
+    """Cells by the number of samples they hold, (most + 1,) float64; those with all they need count as of `most`.
 
     Args:
         number: (slots,) int32 samples in each slot; empty if nothing was traced yet.
+        settled: (slots,) uint8, 1 for a cell that needs no more; empty if there is none.
         slots: (n,) int64 slot of each cell.
-        most: 1 or more.
+        most: samples a cell needs unless it is settled, 1 or more.
     """
     held = np.zeros(most + 1)
     if len(number) == 0:
         held[0] = len(slots)
     else:
-        _count_held(number, slots, held)
+        _count_held(number, settled, slots, held)
     return held
 
 
 @kernel
-def _count_held(number: NDArray[np.int32], slots: NDArray[np.int64], held: NDArray[np.float64]) -> None:
+def _count_held(
+    number: NDArray[np.int32], settled: NDArray[np.uint8], slots: NDArray[np.int64], held: NDArray[np.float64]
+) -> None:
     most = len(held) - 1
     for cell in range(len(slots)):
-        held[min(most, number[slots[cell]])] += 1.0
+        slot = slots[cell]
+        done = len(settled) > 0 and settled[slot] != 0
+        held[most if done else min(most, number[slot])] += 1.0
 
 
 @kernel
 def add_samples(
     samples: Samples,
+    spread: Spread,
     slots: NDArray[np.int64],
     cells: NDArray[np.int32],
     until: NDArray[np.int32],
@@ -200,7 +232,7 @@ def add_samples(
     """Add the radiance of the next samples of some cells, in the order of the samples.
 
     Args:
-        samples: the store.
+        samples, spread: the store.
         slots: (n,) int64 slot of each cell of the map.
         cells: (c,) int32 cells that were sampled.
         until: (c,) int32 samples each of them has then.
@@ -210,20 +242,24 @@ def add_samples(
         How many samples were not a number or negative, and count as black.
     """
     total, squares, count = samples.total, samples.square, samples.number
+    low, high = spread.low, spread.high
     rejected = 0
     row = 0
     for index in range(len(cells)):
         slot = slots[cells[index]]
         red, green, blue = total[slot, 0], total[slot, 1], total[slot, 2]
         square = squares[slot]
-        for _ in range(count[slot], until[index]):
+        for sample in range(count[slot], until[index]):
             r, g, b = radiance[row, 0], radiance[row, 1], radiance[row, 2]
             row += 1
             if not (r >= 0.0 and g >= 0.0 and b >= 0.0):
                 rejected += 1
-                continue
+                r = g = b = np.float32(0.0)
             r, g, b = min(r, BRIGHTEST), min(g, BRIGHTEST), min(b, BRIGHTEST)
             luminance = np.float32(LUMINANCE[0]) * r + np.float32(LUMINANCE[1]) * g + np.float32(LUMINANCE[2]) * b
+            if sample < FIRST_ROUND and len(low) > 0:
+                low[slot] = min(low[slot], luminance) if sample > 0 else luminance
+                high[slot] = max(high[slot], luminance)
             red += r
             green += g
             blue += b

@@ -44,7 +44,10 @@ BucketPx = Annotated[
     int, Field(ge=0, le=MAX_BUCKET_PX, description="side of the squares of gaze that share a map [px]; 0: exact gaze")
 ]
 Samples = Annotated[int, Field(ge=1, le=MAX_SAMPLES, description="camera rays a cell")]
-Antialiasing = Annotated[Literal["stochastic", "regular"], Field(description="where in a cell they go")]
+Antialiasing = Annotated[
+    Literal["stochastic", "regular", "adaptive"],
+    Field(description="where in a cell they go; adaptive: samples_per_cell only where fewer leave a visible error"),
+]
 ShadowSamples = Annotated[
     int, Field(ge=1, le=MAX_SAMPLES, description="shadow rays a cell sends to each light with a size")
 ]

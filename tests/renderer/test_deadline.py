@@ -147,6 +147,24 @@ def test_an_impossible_deadline_gives_the_coarsest_and_a_huge_one_the_full_frame
     fresh.close()
 
 
+def test_cells_that_settled_for_fewer_samples_count_as_done(scene: PreparedScene) -> None:
+    """With rates at which nothing can be traced, an adaptive frame that is there is shown whole."""
+    made = Renderer(threads=2)
+    wanted = asked("aligned", None)
+    wanted = dataclasses.replace(
+        wanted, quality=dataclasses.replace(wanted.quality, antialiasing="adaptive", samples_per_cell=24)
+    )
+    full = made.render(scene, wanted)
+    assert full.cost.mean_samples < 24
+    patient = Rates(1e9, 0.0, 1e9)
+    made._pace.rates = lambda *_: patient  # type: ignore[method-assign]
+    timed = dataclasses.replace(wanted, quality=dataclasses.replace(wanted.quality, deadline_ms=1000.0))
+    again = made.render(scene, timed)
+    assert (again.cost.acuity_scale, again.cost.samples_per_cell, again.cost.samples_traced) == (8.0, 24, 0)
+    np.testing.assert_array_equal(again.pixels, full.pixels)
+    made.close()
+
+
 def test_samples_that_are_there_make_finer_frames_fit(scene: PreparedScene) -> None:
     """With rates at which nothing can be traced but a stored frame can be shown."""
     made = Renderer(threads=2)

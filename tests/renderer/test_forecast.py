@@ -14,7 +14,7 @@ from renderer.quality import Quality
 from renderer.store import aligned_slots, held_by_number, slots_of
 
 SCREEN = Display(960, 540, 50.0, 35.0, 60.0)
-NOTHING = np.zeros(0, np.int32)
+NOTHING, NO_FLAGS = np.zeros(0, np.int32), np.zeros(0, np.uint8)
 
 
 @pytest.mark.parametrize("eccentricity", ECCENTRICITIES)
@@ -24,7 +24,7 @@ def test_cells_are_counted_within_some_percent(
     renderer: Renderer, eccentricity: str, scale: float, gaze: tuple[float, float]
 ) -> None:
     acuity = Acuity(eccentricity=eccentricity, scale=scale)
-    forecast = forecast_held(SCREEN, acuity, bucket_of(Gaze(*gaze), 16), NOTHING, 3)
+    forecast = forecast_held(SCREEN, acuity, bucket_of(Gaze(*gaze), 16), NOTHING, NO_FLAGS, 3)
     assert forecast[1:].tolist() == [0, 0, 0]
     for tiling, slack in (("aligned", 0.2), ("scanline", 1.0)):
         cells = renderer.cell_map(SCREEN, Quality(map=tiling, acuity=acuity), Gaze(*gaze))[0].cells
@@ -40,8 +40,8 @@ def test_cells_that_are_there_after_a_move_are_found(renderer: Renderer, move_px
     number[slots] = 2
     number[slots[::3]] = 9
     gaze = Gaze(300 + move_px, 200)
-    truth = held_by_number(number, slots_of(renderer.cell_map(SCREEN, quality, gaze)[0]), 4)
-    forecast = forecast_held(SCREEN, quality.acuity, bucket_of(gaze, 16), number, 4)
+    truth = held_by_number(number, NO_FLAGS, slots_of(renderer.cell_map(SCREEN, quality, gaze)[0]), 4)
+    forecast = forecast_held(SCREEN, quality.acuity, bucket_of(gaze, 16), number, NO_FLAGS, 4)
     np.testing.assert_allclose(forecast / forecast.sum(), truth / truth.sum(), atol=0.04)
 
 
@@ -49,7 +49,7 @@ def test_cells_that_are_there_after_a_move_are_found(renderer: Renderer, move_px
 def test_small_screens_are_counted_too(renderer: Renderer, size: tuple[int, int]) -> None:
     display = Display(*size, width_cm=0.5)
     cells = renderer.cell_map(display, Quality(), Gaze(0, 0))[0].cells
-    forecast = forecast_held(display, Acuity(), bucket_of(Gaze(0, 0), 16), NOTHING, 1)
+    forecast = forecast_held(display, Acuity(), bucket_of(Gaze(0, 0), 16), NOTHING, NO_FLAGS, 1)
     assert 0 < forecast.sum() <= size[0] * size[1]
     if min(size) > 1:
         assert forecast.sum() == pytest.approx(cells, rel=0.3)
@@ -57,6 +57,8 @@ def test_small_screens_are_counted_too(renderer: Renderer, size: tuple[int, int]
 
 def test_held_samples_are_counted() -> None:
     number = np.array([3, 0, 7, 3, 1], np.int32)
-    assert held_by_number(number, np.array([0, 1, 2, 3]), 3).tolist() == [1, 0, 0, 3]
-    assert held_by_number(number, np.array([2, 4]), 8).tolist() == [0, 1, 0, 0, 0, 0, 0, 1, 0]
-    assert held_by_number(NOTHING, np.array([2, 4, 5]), 2).tolist() == [3, 0, 0]
+    assert held_by_number(number, NO_FLAGS, np.array([0, 1, 2, 3]), 3).tolist() == [1, 0, 0, 3]
+    assert held_by_number(number, NO_FLAGS, np.array([2, 4]), 8).tolist() == [0, 1, 0, 0, 0, 0, 0, 1, 0]
+    settled = np.array([0, 0, 1, 0, 1], np.uint8)
+    assert held_by_number(number, settled, np.array([0, 1, 2, 4]), 9).tolist() == [1, 0, 0, 1, 0, 0, 0, 0, 0, 2]
+    assert held_by_number(NOTHING, NO_FLAGS, np.array([2, 4, 5]), 2).tolist() == [3, 0, 0]

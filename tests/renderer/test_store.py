@@ -92,7 +92,7 @@ def sample(radiance: NDArray[np.float32], *parts: int) -> SampleStore:
     for length in parts:
         part = np.ascontiguousarray(radiance[:, start : start + length]).reshape(-1, 3)
         start += length
-        assert add_samples(store.samples, slots, cells, np.full(2, start, np.int32), part) == 0
+        assert add_samples(store.samples, store.spread, slots, cells, np.full(2, start, np.int32), part) == 0
     return store
 
 
@@ -110,8 +110,10 @@ def test_sums_do_not_depend_on_the_parts_they_were_added_in() -> None:
 def test_cells_get_different_numbers_of_samples() -> None:
     radiance = np.random.default_rng(1).random((7, 3)).astype(np.float32)
     store, slots, both = SampleStore(2), np.array([1, 0]), np.array([0, 1], np.int32)
-    assert add_samples(store.samples, slots, both, np.array([2, 1], np.int32), radiance[[0, 1, 4]]) == 0
-    assert add_samples(store.samples, slots, both, np.array([4, 3], np.int32), radiance[[2, 3, 5, 6]]) == 0
+    assert add_samples(store.samples, store.spread, slots, both, np.array([2, 1], np.int32), radiance[[0, 1, 4]]) == 0
+    assert (
+        add_samples(store.samples, store.spread, slots, both, np.array([4, 3], np.int32), radiance[[2, 3, 5, 6]]) == 0
+    )
     assert store.samples.number.tolist() == [3, 4]
     np.testing.assert_allclose(store.samples.total[1], radiance[:4].sum(axis=0), rtol=1e-6)
     np.testing.assert_allclose(store.samples.total[0], radiance[4:].sum(axis=0), rtol=1e-6)
@@ -121,11 +123,11 @@ def test_cells_with_too_few_samples_are_missing() -> None:
     store = sample(np.ones((2, 4, 3), np.float32), 4)
     store.samples.number[1] = 3
     slots, missing, first = np.array([5, 1, 2, 0]), np.zeros(4, np.int32), np.zeros(4, np.int32)
-    assert missing_cells(store.samples, slots, 4, missing, first) == (2, 11, 0)
+    assert missing_cells(store.samples, store.spread, slots, 4, missing, first) == (2, 11, 0)
     assert (missing[:2].tolist(), first[:2].tolist()) == ([1, 3], [3, 0])
-    assert missing_cells(store.samples, slots, 1, missing, first) == (1, 11, 0)
-    assert missing_cells(store.samples, slots, 5, missing, first)[0] == 4
-    assert missing_cells(store.samples, slots[:3], 2, missing, first) == (0, 11, 3)
+    assert missing_cells(store.samples, store.spread, slots, 1, missing, first) == (1, 11, 0)
+    assert missing_cells(store.samples, store.spread, slots, 5, missing, first)[0] == 4
+    assert missing_cells(store.samples, store.spread, slots[:3], 2, missing, first) == (0, 11, 3)
 
 
 @pytest.mark.parametrize("bad", [np.nan, -1e-9, -np.inf])
@@ -134,7 +136,12 @@ def test_h50_a_sample_that_is_no_light_counts_as_black_and_is_counted(bad: float
     radiance = np.ones((4, 3), np.float32)
     radiance[2, channel] = bad
     store = SampleStore(1)
-    assert add_samples(store.samples, np.array([0]), np.array([0], np.int32), np.array([4], np.int32), radiance) == 1
+    assert (
+        add_samples(
+            store.samples, store.spread, np.array([0]), np.array([0], np.int32), np.array([4], np.int32), radiance
+        )
+        == 1
+    )
     np.testing.assert_array_equal(store.samples.total[0], 3.0)
     assert store.samples.number[0] == 4
     assert np.isfinite(store.samples.square).all()
@@ -145,7 +152,7 @@ def test_h50_endless_light_is_cut_where_its_squares_still_fit(huge: float) -> No
     radiance = np.full((4096, 3), huge, np.float32)
     store = SampleStore(1)
     all_of_them = np.array([4096], np.int32)
-    assert add_samples(store.samples, np.array([0]), np.array([0], np.int32), all_of_them, radiance) == 0
+    assert add_samples(store.samples, store.spread, np.array([0]), np.array([0], np.int32), all_of_them, radiance) == 0
     np.testing.assert_allclose(store.samples.total[0] / 4096, BRIGHTEST, rtol=1e-3)
     assert np.isfinite(store.samples.square[0])
 
