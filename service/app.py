@@ -19,6 +19,7 @@ from service.access import OwnNamesOnly, SafeHeaders, SmallBodiesOnly, TokenOnly
 from service.catalogue import Catalogue
 from service.desk import Desk
 from service.jobs import JobQueue
+from service.metrics import Metrics
 from service.openapi import describe_api
 from service.problem import answer_errors
 from service.rendering import Studio
@@ -52,7 +53,7 @@ def create_app(
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         own = renderer or Renderer(settings.threads, settings.map_cache_bytes, settings.store_bytes)
         library = SceneLibrary(settings.scenes, settings.scene_bytes)
-        studio = Studio(settings, own, library)
+        studio = Studio(settings, own, library, Metrics())
         desk = Desk(
             studio,
             Catalogue(library),

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from service import protocol
+from service.metrics import Metrics
 from service.protocol import CloseCode, ProtocolError
 from service.shown import Shown
 
@@ -32,11 +33,12 @@ class Outbox:
     Args:
         clock: monotonic [ns].
         status: what to send as the status.
+        metrics: counts.
     """
 
-    def __init__(self, clock: Callable[[], int], status: Callable[[], protocol.Status]) -> None:
+    def __init__(self, clock: Callable[[], int], status: Callable[[], protocol.Status], metrics: Metrics) -> None:
         self.dropped = 0
-        self.bytes_sent = 0
+        self._metrics = metrics
         self._clock = clock
         self._status = status
         self._messages: deque[str] = deque()
@@ -75,6 +77,7 @@ class Outbox:
         """Forget the frame that waits."""
         if self._frame is not None:
             self.dropped += 1
+            self._metrics.dropped()
         self._frame = None
 
     def acknowledge(self, number: int) -> None:
@@ -102,8 +105,6 @@ class Outbox:
         """What to send next, once there is something: messages first, then status, then a frame."""
         while True:
             if (found := self._take()) is not None:
-                if not isinstance(found, Close):
-                    self.bytes_sent += len(found)
                 return found
             self._wake.clear()
             await self._wake.wait()
@@ -119,5 +120,6 @@ class Outbox:
         if self._frame is not None and self._in_flight is None:
             frame, self._frame = self._frame, None
             self._in_flight = self._last_sent = frame.number
+            self._metrics.sent("stream", len(frame.image))
             return frame.packed(self.dropped, self._clock())
         return None

@@ -5,15 +5,17 @@ from __future__ import annotations
 import hashlib
 from importlib import resources
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
-from fastapi import APIRouter, HTTPException, Request
+from fastapi import APIRouter, HTTPException, Query, Request
 from pydantic import BaseModel, Field
 from starlette.responses import HTMLResponse, Response
 
 from service.desk import TheDesk
 from service.docs import documentation
+from service.metrics import MEDIA_TYPE
 from service.openapi import ERRORS
+from service.request import NoQuery
 
 MEDIA_TYPE_OF_SUFFIX = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
 
@@ -78,6 +80,20 @@ async def readyz(desk: TheDesk) -> Readiness:
     """Answer 503 until the kernels are compiled."""
     desk.studio.require_ready()
     return Readiness(running=desk.renders.running, waiting=desk.renders.waiting)
+
+
+@router.get(
+    "/metrics",
+    tags=["health"],
+    summary="Counts and times, for Prometheus",
+    response_class=Response,
+    responses={200: {"description": "Prometheus' text format", "content": {"text/plain": {}}}, 401: ERRORS[401]},
+)
+async def metrics(_: Annotated[NoQuery, Query()], desk: TheDesk) -> Response:
+    """Frames, rays by kind, times of the stages, cache hits, sessions, viewers, what was superseded and dropped."""
+    sessions = desk.sessions.all()
+    viewers, sources = sum(len(each.viewers) for each in sessions), sum(len(each.sources) for each in sessions)
+    return Response(desk.studio.metrics.text(len(sessions), viewers, sources), media_type=MEDIA_TYPE)
 
 
 def _file(name: str, request: Request) -> Response:

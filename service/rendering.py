@@ -21,6 +21,7 @@ from renderer.library import SceneLibrary
 from renderer.pipeline import Renderer
 from renderer.prepared import PreparedScene
 from renderer.quality import Quality
+from service.metrics import Metrics
 from service.settings import Settings
 
 NS_PER_MS = 1_000_000
@@ -104,10 +105,12 @@ class Studio:
         settings: limits.
         renderer: traces; belongs to the caller.
         library: scenes; belongs to the caller.
+        metrics: counts frames.
     """
 
-    def __init__(self, settings: Settings, renderer: Renderer, library: SceneLibrary) -> None:
+    def __init__(self, settings: Settings, renderer: Renderer, library: SceneLibrary, metrics: Metrics) -> None:
         self.settings = settings
+        self.metrics = metrics
         self.library = library
         self._renderer = renderer
         self._frames = itertools.count(1)
@@ -233,6 +236,8 @@ class Studio:
                 "finished": finished_ns,
             },
         }
+        self.metrics.encoded("request", timing_ms["encode"])
+        self.metrics.sent("request", len(data))
         return Picture(data, header, timing_ms)
 
     def trace(
@@ -256,7 +261,9 @@ class Studio:
         cost = replace(frame.cost, map_cached=frame.cost.map_cached and known_map)
         if cost.rejected_samples:
             log.warning("%s: %d samples were not finite and count as black", scene_id, cost.rejected_samples)
-        return Rendered(replace(frame, cost=cost), map_ms, started_ns, time.monotonic_ns())
+        rendered = Rendered(replace(frame, cost=cost), map_ms, started_ns, time.monotonic_ns())
+        self.metrics.frame(cost, rendered.stages())
+        return rendered
 
     def _check_cells(self, request: FrameRequest) -> tuple[bool, float]:
         """Count the cells where the pixels alone do not tell that the rays are few enough.

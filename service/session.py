@@ -107,7 +107,7 @@ class Session:
 
     def outbox(self) -> Outbox:
         """A place for what waits to be sent to one client of this session."""
-        return Outbox(self._clock, self.status)
+        return Outbox(self._clock, self.status, self._stage.studio.metrics)
 
     def join_viewer(self, viewer: Outbox) -> None:
         """Show frames to a viewer, the present one first."""
@@ -143,7 +143,9 @@ class Session:
         now_ns = self._clock()
         state = self.attention.state
         for sample in samples:
-            self._counts.superseded += self._gaze_waits
+            if self._gaze_waits:
+                self._counts.superseded += 1
+                self._stage.studio.metrics.superseded()
             self._gaze_waits = True
             self.attention = observe(self.attention, sample, now_ns)
         if self.attention.state != state:
@@ -299,6 +301,7 @@ class Session:
             step = replace(step, phase="final")
         if step.phase == "moving":
             self._encode_ms += ENCODE_GAIN * (encoded.encode_ms - self._encode_ms)
+            self._stage.studio.metrics.moved((encoded.finished_ns - asked_ns) / NS_PER_MS)
         progress.taken = Taken(step, attention, asked_ns, rendered)
         self._counts.rejected += cost.rejected_samples
         self._show(progress.taken, encoded)

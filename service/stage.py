@@ -19,6 +19,8 @@ from service.rendering import NS_PER_MS, Order, Rendered, Studio
 LOSSLESS_THREADS = 1
 """Lossless pictures encoded at once: they may wait, the frames of a moving gaze may not."""
 
+LOSSLESS_QUALITY = 100
+
 Result = TypeVar("Result")
 
 
@@ -72,26 +74,27 @@ class Stage:
 
         def work() -> tuple[Rendered, Encoded]:
             rendered = self.studio.trace(configuration.order.scene_id, configuration.prepared, step.request, abandon)
-            return rendered, _encoded(rendered.frame, step.format, step.image_quality)
+            return rendered, self._encode(rendered.frame, step.format, step.image_quality)
 
         return await self._on(self._renders, work)
 
     async def encode_lossless(self, frame: Frame, image_format: str) -> Encoded:
         """A frame once more, without loss."""
-        return await self._on(self._lossless, lambda: _encoded(frame, image_format, 100))
+        return await self._on(self._lossless, lambda: self._encode(frame, image_format, LOSSLESS_QUALITY))
 
     def close(self) -> None:
         """Take no more work; what has begun ends by itself."""
         for threads in (self._renders, self._loads, self._lossless):
             threads.shutdown(wait=False, cancel_futures=True)
 
+    def _encode(self, frame: Frame, image_format: str, quality: int) -> Encoded:
+        began_ns = time.monotonic_ns()
+        image = encode(frame.pixels, image_format, quality)
+        finished_ns = time.monotonic_ns()
+        encode_ms = (finished_ns - began_ns) / NS_PER_MS
+        self.studio.metrics.encoded("stream", encode_ms)
+        return Encoded(image, encode_ms, finished_ns)
+
     @staticmethod
     async def _on(threads: ThreadPoolExecutor, work: Callable[[], Result]) -> Result:
         return await asyncio.get_running_loop().run_in_executor(threads, work)
-
-
-def _encoded(frame: Frame, image_format: str, quality: int) -> Encoded:
-    began_ns = time.monotonic_ns()
-    image = encode(frame.pixels, image_format, quality)
-    finished_ns = time.monotonic_ns()
-    return Encoded(image, (finished_ns - began_ns) / NS_PER_MS, finished_ns)

@@ -119,3 +119,9 @@ def sessions(address: str) -> dict[str, Any]:
     """The service's sessions by name."""
     listed = httpx.get(f"{address}/v1/sessions", timeout=PATIENCE_S).json()["sessions"]
     return {session["session"]: session for session in listed}
+
+
+def settle(peer: Peer, number: int) -> None:
+    """Return when the service has read everything said so far."""
+    peer.say(protocol.Ping(number, 0))
+    peer.next(protocol.Pong, lambda pong: pong.id == number)

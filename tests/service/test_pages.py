@@ -34,7 +34,7 @@ def test_the_openapi_document_is_of_this_service(client: httpx.Client) -> None:
     assert document["info"]["version"] == package_version()
     assert set(document["paths"]) == {
         "/v1/render", "/v1/scenes", "/v1/scenes/{scene_id}", "/v1/scenes/{scene_id}/frame", "/v1/cellmap",
-        "/v1/sessions", "/healthz", "/readyz",
+        "/v1/sessions", "/healthz", "/readyz", "/metrics",
     }  # fmt: skip
     assert "securitySchemes" not in document["components"]
     references = set(re.findall(r"#/components/schemas/(\w+)", client.get("/openapi.json").text))

@@ -12,10 +12,10 @@ import pytest
 from PIL import Image
 
 from renderer.pipeline import Renderer
-from service.protocol import Ack, Camera, Error, Frame, Gaze, Ping, Pong, Quality, Ready, Status
+from service.protocol import Ack, Camera, Error, Frame, Gaze, Quality, Ready, Status
 from service.settings import Settings
 from tests.service.conftest import PATIENCE_S, serving
-from tests.service.streaming import COARSE, TINY, Clock, Peer, configure, sessions, viewer
+from tests.service.streaming import COARSE, TINY, Clock, configure, sessions, settle, viewer
 
 
 def pixels(image: bytes) -> Any:
@@ -26,12 +26,6 @@ def wait_for_frames(address: str, session: str, frames: int) -> None:
     """Return when the session has rendered so many frames."""
     while sessions(address)[session]["frames"] < frames:
         pass
-
-
-def settle(peer: Peer, number: int) -> None:
-    """Return when the service has read everything said so far."""
-    peer.say(Ping(number, 0))
-    peer.next(Pong, lambda pong: pong.id == number)
 
 
 @pytest.fixture
