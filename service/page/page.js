@@ -120,6 +120,7 @@ function ready(message, own) {
   stage.display = display;
   if (own) orbit.home ??= message.camera;
   panel.configured(message, quality);
+  picker.describe(message.scene);
 }
 
 function refuse({ message, field }) {
@@ -251,9 +252,8 @@ for (const [id, run] of Object.entries({
 addEventListener("hashchange", chooseScene);
 
 settings.distanceCm = screen.distanceCm;
-gaze.lookAt(CENTRE);
-stream.start();
 settings.offer(await service.qualitySchema());
 [scene] = await picker.load();
+gaze.lookAt(CENTRE);
 chooseScene();
-await picker.describe();
+stream.start();

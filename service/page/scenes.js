@@ -9,9 +9,8 @@ export class ScenePicker {
   #label;
   #service;
   #onPick;
-  #summaries = new Map();
+  #entries = new Map(); // by id: the entry, and what it tells once that is known
   #chosen = null;
-  #pictures = new Map();
 
   /**
    * @param popover element to fill and show
@@ -28,63 +27,61 @@ export class ScenePicker {
     popover.addEventListener("keydown", (event) => this.#move(event));
   }
 
-  /** Learn the ids, then what each scene is. */
+  /** Learn which scenes there are: their ids. */
   async load() {
     const ids = await this.#service.sceneIds();
-    for (const id of ids) this.#summaries.set(id, { id });
-    this.#fill();
+    for (const id of ids) this.#entries.set(id, this.#entry(id));
+    this.#popover.replaceChildren(...[...this.#entries.values()].map(({ button }) => button));
     return ids;
-  }
-
-  /** Learn each scene's size and effects, which may take the service a while. */
-  async describe() {
-    for (const summary of await this.#service.scenes()) this.#summaries.set(summary.id, summary);
-    this.#fill();
-    this.choose(this.#chosen);
   }
 
   /** Show `id` as the chosen one. */
   choose(id) {
     this.#chosen = id;
-    this.#label.textContent = this.#summaries.get(id)?.title ?? id;
-    for (const button of this.#popover.children) button.setAttribute("aria-current", button.dataset.scene === id);
+    this.#label.textContent = this.#entries.get(id)?.title.textContent ?? id;
+    for (const [each, { button }] of this.#entries) button.setAttribute("aria-current", each === id);
   }
 
-  #fill() {
-    this.#popover.replaceChildren(...[...this.#summaries.values()].map((summary) => this.#entry(summary)));
-    this.choose(this.#chosen);
+  /** Learn a scene's title, size and effects. */
+  async describe(id) {
+    const entry = this.#entries.get(id);
+    if (!entry || entry.known) return;
+    entry.known = true;
+    try {
+      const { title, triangles, spheres, effects } = await this.#service.scene(id);
+      entry.title.textContent = title;
+      entry.size.textContent = sizeOf(triangles, spheres);
+      entry.effects.textContent = effects.map(({ name }) => name.replaceAll("_", " ")).join(", ") || NO_EFFECTS;
+    } catch (error) {
+      entry.size.textContent = error.message;
+      entry.button.classList.add("broken");
+    }
+    if (id === this.#chosen) this.choose(id);
   }
 
-  #entry({ id, title, triangles, spheres, effects, error }) {
+  #entry(id) {
+    const [title, size, effects] = [line("title", id), line("size", "…"), line("effects", "")];
+    const picture = Object.assign(document.createElement("img"), { ...THUMBNAIL, alt: "" });
+    const told = document.createElement("span");
+    told.append(title, size, effects);
     const button = document.createElement("button");
     button.dataset.scene = id;
-    const picture = document.createElement("img");
-    Object.assign(picture, { ...THUMBNAIL, alt: "" });
-    if (this.#pictures.has(id)) picture.src = this.#pictures.get(id);
-    const told = document.createElement("span");
-    told.append(
-      line("title", title ?? id),
-      line("size", error ?? (effects ? sizeOf(triangles, spheres) : "…")),
-      line("effects", effects ? effects.map((name) => name.replaceAll("_", " ")).join(", ") || NO_EFFECTS : ""),
-    );
-    if (error) button.classList.add("broken");
     button.append(picture, told);
     button.addEventListener("click", () => {
       this.#popover.hidePopover();
       this.#onPick(id);
     });
-    return button;
+    return { button, picture, title, size, effects, known: false };
   }
 
+  /** Only who opens the picker waits for every scene to be loaded. */
   async #opened() {
-    this.#popover.querySelector("[aria-current=true]")?.focus();
-    for (const { id, error } of this.#summaries.values()) {
-      if (error || this.#pictures.has(id)) continue;
-      this.#pictures.set(id, "");
-      const picture = await this.#service.thumbnail(id, THUMBNAIL.width, THUMBNAIL.height).catch(() => null);
-      if (!picture) continue;
-      this.#pictures.set(id, URL.createObjectURL(picture));
-      this.#popover.querySelector(`[data-scene="${CSS.escape(id)}"] img`).src = this.#pictures.get(id);
+    this.#entries.get(this.#chosen)?.button.focus();
+    for (const [id, { button, picture }] of this.#entries) {
+      await this.describe(id);
+      if (picture.src || button.classList.contains("broken")) continue;
+      const shown = await this.#service.thumbnail(id, THUMBNAIL.width, THUMBNAIL.height).catch(() => null);
+      if (shown) picture.src = URL.createObjectURL(shown);
     }
   }
 

@@ -49,12 +49,7 @@ export class Service {
     return (await this.#json("v1/scenes?details=false")).scenes.map(({ id }) => id);
   }
 
-  /** One line on each scene; of a broken one its error. */
-  async scenes() {
-    return (await this.#json("v1/scenes?details=true")).scenes;
-  }
-
-  /** A scene's camera, effects and size. */
+  /** A scene's title, size and effects; the service loads it where it has not yet. */
   scene(id) {
     return this.#json(`v1/scenes/${encodeURIComponent(id)}`);
   }

@@ -182,17 +182,20 @@ export class Stream {
   async #receive(buffer) {
     const socket = this.#socket;
     const { header, image } = takeApart(buffer);
-    const picture = header.config === this.#current ? await createImageBitmap(image) : null;
-    if (picture && header.config === this.#current) {
-      this.#on.frame({ header, picture });
-      this.#unseen = false;
-    } else {
-      picture?.close();
-    }
-    await shown();
-    if (socket === this.#socket) {
-      this.#send({ type: "ack", frame: header.frame });
-      this.#sync();
+    try {
+      const picture = header.config === this.#current ? await createImageBitmap(image) : null;
+      if (picture && header.config === this.#current) {
+        this.#on.frame({ header, picture });
+        this.#unseen = false;
+      } else {
+        picture?.close();
+      }
+    } finally {
+      await shown();
+      if (socket === this.#socket) {
+        this.#send({ type: "ack", frame: header.frame });
+        this.#sync();
+      }
     }
   }
 

@@ -74,6 +74,11 @@ class Page:
             self.evaluate(f"localStorage.setItem('gazetrace-settings', {json.dumps(json.dumps(settings))})")
         self.command("Page.navigate", url=url)
 
+    def reload(self) -> None:
+        """Open the same page again; what it said so far is forgotten."""
+        self.events.clear()
+        self.command("Page.reload")
+
     def leave(self) -> None:
         """Close the page, and forget what it said and stored."""
         self._session = None
@@ -165,20 +170,26 @@ class Page:
         ]
 
     def shown(self, which: Callable[[FrameHeader], bool] = lambda _: True) -> FrameHeader:
-        """Wait until the page has acknowledged, and so drawn, a frame like this; the header of the newest."""
+        """Wait until the newest frame that the page has acknowledged, and so drawn, is like this; its header."""
         deadline = time.monotonic() + PATIENCE_S
         while time.monotonic() < deadline:
-            acknowledged = {message["frame"] for message in self.said("ack")[-4:]}
-            for event in reversed(self.events):
-                response = event["params"].get("response", {})
-                if event["method"] == "Network.webSocketFrameReceived" and response["opcode"] == BINARY:
-                    header = unpack_frame(base64.b64decode(response["payloadData"])).header
-                    if header.frame in acknowledged:
-                        if which(header):
-                            return header
-                        break
+            newest = self._newest_drawn()
+            if newest is not None and which(newest):
+                return newest
             self.evaluate("new Promise((done) => setTimeout(done, 16))")
         raise AssertionError(f"no such frame; the page says: {self.evaluate('document.body.innerText')}")
+
+    def _newest_drawn(self) -> FrameHeader | None:
+        acknowledged = set()
+        for event in reversed(self.events):
+            response = event["params"].get("response", {})
+            if event["method"] == "Network.webSocketFrameSent" and response["opcode"] == TEXT:
+                acknowledged.add(json.loads(response["payloadData"]).get("frame"))
+            elif event["method"] == "Network.webSocketFrameReceived" and response["opcode"] == BINARY:
+                header = unpack_frame(base64.b64decode(response["payloadData"])).header
+                if header.frame in acknowledged:
+                    return header
+        return None
 
     def _texts(self, event_name: str) -> list[str]:
         frames = [event["params"]["response"] for event in self.events if event["method"] == f"Network.{event_name}"]
