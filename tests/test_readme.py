@@ -18,6 +18,8 @@ import numpy as np
 import pytest
 import trimesh
 
+from clients.bridge.config import VARIABLE_PREFIX as BRIDGE_PREFIX
+from clients.bridge.config import Config
 from clients.command_line import build_parser, main
 from renderer.codec import encode
 from renderer.scene_file import load_scene_folder
@@ -87,7 +89,7 @@ def test_each_command_works(words: list[str], tmp_path: Path, monkeypatch: pytes
     monkeypatch.chdir(tmp_path)
     trimesh.creation.icosphere(subdivisions=2).export(tmp_path / "model.glb")
     (tmp_path / "my-scenes").mkdir()
-    if words[0] == "serve":
+    if words[0] in ("serve", "bridge"):
         assert build_parser().parse_args(words).run is not None
         return
     (tmp_path / "eye.csv").write_text("t_ms,x_px,y_px\n0,960,540\n40,1200,300\n")
@@ -101,7 +103,7 @@ def test_each_command_works(words: list[str], tmp_path: Path, monkeypatch: pytes
 
 def test_the_table_of_commands_is_complete() -> None:
     named = {words.split()[1].strip("`") for words, _ in table("Commands")}
-    assert named == {"serve", "render", "scenes", "bench", "animate", "watch"}
+    assert named == {"serve", "render", "scenes", "bench", "animate", "watch", "bridge"}
 
 
 def test_every_setting_is_in_the_table_with_its_default() -> None:
@@ -119,7 +121,9 @@ def test_every_setting_is_in_the_table_with_its_default() -> None:
 def test_no_file_names_a_setting_that_does_not_exist(text: str) -> None:
     named = set(re.findall(r"GAZETRACE_[A-Z_]+", text))
     assert named
-    assert named <= {VARIABLE_PREFIX + setting.name.upper() for setting in fields(Settings)}
+    known = {VARIABLE_PREFIX + setting.name.upper() for setting in fields(Settings)}
+    known |= {BRIDGE_PREFIX + setting.name.upper() for setting in fields(Config)}
+    assert named <= known | {BRIDGE_PREFIX, BRIDGE_PREFIX + "CONFIG"}
 
 
 @pytest.mark.parametrize(

@@ -39,6 +39,8 @@ class CalibrationWalk:
 
     Args:
         targets: where they are shown, in fractions of the screen.
+        arrive_ns: how long the eye may take to get there.
+        look_ns: how long its gaze is collected then.
 
     Attributes:
         state: where it is.
@@ -46,8 +48,11 @@ class CalibrationWalk:
         pairs: of the targets already done.
     """
 
-    def __init__(self, targets: Sequence[Point] = NINE_POINTS) -> None:
+    def __init__(
+        self, targets: Sequence[Point] = NINE_POINTS, arrive_ns: int = ARRIVE_NS, look_ns: int = LOOK_NS
+    ) -> None:
         self.targets = tuple(targets)
+        self._arrive_ns, self._look_ns = arrive_ns, look_ns
         self.state = WalkState.WALKING
         self.index = 0
         self.pairs: list[Pair] = []
@@ -74,7 +79,7 @@ class CalibrationWalk:
             return True
         if measured is not None and now_ns >= self._collect_from_ns:
             self._measured.append(measured)
-        if len(self._measured) >= LEAST_SAMPLES and now_ns >= self._collect_from_ns + LOOK_NS:
+        if len(self._measured) >= LEAST_SAMPLES and now_ns >= self._collect_from_ns + self._look_ns:
             self.pairs.append(Pair(middle_of(self._measured), self.target))
             if self.index + 1 == len(self.targets):
                 self.state = WalkState.DONE
@@ -89,7 +94,7 @@ class CalibrationWalk:
 
     def _show(self, now_ns: int) -> None:
         self._shown_ns = now_ns
-        self._collect_from_ns = now_ns + ARRIVE_NS
+        self._collect_from_ns = now_ns + self._arrive_ns
         self._measured = []
 
 

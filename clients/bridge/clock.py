@@ -69,13 +69,17 @@ class DeviceClock:
         self._last_ns: int | None = None
         self._last_ticks: float | None = None
         self._jumps = 0
+        self._wraps = 0
         self._seen: list[tuple[float, int]] = []
-        self._forget()
+        self.restart()
 
     def restart(self) -> None:
         """Forget all: the device may have been switched on anew."""
-        self.restarts += 1
-        self._forget()
+        self._tick_ns = self._candidates[0] if len(self._candidates) == 1 else None
+        self._seen.clear()
+        self._wraps = 0
+        self._last_ticks = None
+        self._begin()
 
     def map(self, ticks: float | None, arrival_ns: int) -> CaptureTime:
         """The times of a sample.
@@ -103,13 +107,6 @@ class DeviceClock:
     def offset_ns(self, device_ns: int) -> int:
         """Our clock minus the device's at that time of the device, without delay [ns]."""
         return round(self._offset + self.drift * (device_ns - self._origin))
-
-    def _forget(self) -> None:
-        self._tick_ns = self._candidates[0] if len(self._candidates) == 1 else None
-        self._seen.clear()
-        self._wraps = 0
-        self._last_ticks = None
-        self._begin()
 
     def _begin(self) -> None:
         """Start the fit anew."""

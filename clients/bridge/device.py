@@ -97,6 +97,7 @@ class Device:
                 except PortError as error:
                     self._watch.failed(str(error))
                 finally:
+                    self._tell_missing(gone=True)
                     port.close()
                 if not self._stop.is_set():
                     self._wait(self._backoff.wait_s())
@@ -128,6 +129,7 @@ class Device:
             now_ns = self.beat_ns = time.monotonic_ns()
             if chunk is None:
                 self._watch.waited(now_ns)
+                self._tell_missing()
                 if self._watch.start_again(now_ns):
                     self._codec.reset()
                     self._start(port)
@@ -141,6 +143,12 @@ class Device:
                 port.write(due)
         if goodbye := self._codec.stop():
             port.write(goodbye)
+
+    def _tell_missing(self, gone: bool = False) -> None:
+        """No sample comes: after a while that is a lost eye, too."""
+        gaze = self._path.missing(time.monotonic_ns(), gone)
+        if gaze is not None:
+            self._ears.gaze(gaze)
 
     def _start(self, port: Port) -> None:
         """Send what starts the device; throw away what comes between two commands."""

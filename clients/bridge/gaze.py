@@ -20,6 +20,9 @@ PAD_MS = 50.0
 REACH = 2.0
 """A gaze further off the screen than so many screens is a code or a failed calibration, never a gaze."""
 
+SILENCE_NS = 250 * MILLISECOND_NS
+"""Without a sample for so long the eye counts as lost: the slowest line carries eleven records a second."""
+
 Phase = Literal["fixation", "saccade", "blink"]
 
 
@@ -33,7 +36,7 @@ class Gaze(NamedTuple):
         arrival_ns: first byte, by our monotonic clock.
         captured_ns: when the eye was there, estimated, by our monotonic clock.
         received_ns: when the last byte was read.
-        phase: what the eye does; None where that is not known.
+        phase: what the eye does; None where no sample came.
         measured: what the device said, mapped to the screen but not calibrated; None where lost.
     """
 
@@ -90,6 +93,7 @@ class GazePath:
         self._saccades = SaccadeDetector(options.saccade_deg_s)
         self._filter = OneEuro() if options.smooth else None
         self._seq = 0
+        self._last: Gaze | None = None
         self._trusted_from_ns: int | None = None
         self._open = False
 
@@ -122,8 +126,24 @@ class GazePath:
                 self._trusted_from_ns = captured_ns + (self._options.pad_ns if self._seq > 0 else 0)
             at, phase = self._follow(at, captured_ns, self.place.screen)
         x, y = at if at is not None else (None, None)
-        gaze = Gaze(self._seq, x, y, tracker_ns, arrival_ns, captured_ns, received_ns, phase, measured)
+        return self._told(Gaze(self._seq, x, y, tracker_ns, arrival_ns, captured_ns, received_ns, phase, measured))
+
+    def missing(self, now_ns: int, gone: bool = False) -> Gaze | None:
+        """That the eye is lost because no sample comes; None as long as one may, or once that was said.
+
+        Args:
+            now_ns: our monotonic clock.
+            gone: whether the device is known to be gone.
+        """
+        last = self._last
+        if last is None or not last.valid or not (gone or now_ns - last.received_ns >= SILENCE_NS):
+            return None
+        self._forget()
+        return self._told(Gaze(self._seq, None, None, None, now_ns, now_ns, now_ns, None, None))
+
+    def _told(self, gaze: Gaze) -> Gaze:
         self._seq += 1
+        self._last = gaze
         return gaze
 
     def _where(self, sample: Sample) -> tuple[Point | None, Point | None]:

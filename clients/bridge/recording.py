@@ -39,7 +39,7 @@ class Recorder:
 
     Args:
         path: a file that does not exist yet.
-        about: what else to keep, such as the protocol and its options.
+        about: what else to keep, such as the device's settings.
 
     Raises:
         ConfigError: if the file exists or cannot be made.
@@ -171,7 +171,6 @@ class ReplayPort:
         self._next = 0
         self._begin_ns = time.monotonic_ns()
         self._closed = threading.Event()
-        self.byte_ns = float(recording.about.get("byte_ns", 0.0))
 
     def read(self) -> Chunk | None:
         """The next chunk once its time has come; None until then. Raises EndOfInput."""

@@ -36,7 +36,7 @@ class Slot:
                 waiting.pop()
                 self.dropped += 1
             elif len(waiting) == MOST_CHANGES:
-                self.dropped += 1
+                self.dropped += 1  # the deque lets the oldest go
             waiting.append(gaze)
 
     def take(self, now_ns: int) -> list[Gaze]:
@@ -65,6 +65,6 @@ class Slot:
         return len(self._waiting)
 
     def _is_change(self, index: int) -> bool:
-        """Whether the gaze there is the first one that says so, seen or lost."""
+        """Whether the gaze there is the first one that says so, seen or lost; nothing is, to a new listener."""
         before = self._waiting[index - 1].valid if index > 0 else self._told
-        return before != self._waiting[index].valid
+        return self._told is not None and before != self._waiting[index].valid

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from clients.bridge.errors import BridgeError
 from clients.gaze_trace import GazeTraceError
 from renderer.errors import RenderError, SettingsError
 
@@ -22,7 +23,7 @@ class CommandFailed(Exception):
     """What was asked for could not be done, by no fault of the command line; the message is one line."""
 
 
-BAD_INPUTS = (UsageError, RenderError, GazeTraceError)
+BAD_INPUTS = (UsageError, RenderError, GazeTraceError, BridgeError)
 """What the user can mend by other input; their messages are one line fit to show."""
 
 

@@ -94,9 +94,9 @@ def flag_of(setting: str) -> str:
     return FLAGS.get(setting, "--" + setting.replace("_", "-"))
 
 
-def setting_texts() -> dict[str, str]:
-    """What each setting does: the docstring of `Settings`, in the words of a command line."""
-    lines = inspect.cleandoc(Settings.__doc__ or "").splitlines()
+def setting_texts(record: type[Any] = Settings) -> dict[str, str]:
+    """What each setting does: the docstring of the record of settings, in the words of a command line."""
+    lines = inspect.cleandoc(record.__doc__ or "").splitlines()
     texts = {match[1]: match[2] for line in lines if (match := re.fullmatch(r"    (\w+): (.+?)\.?", line))}
     return {name: text.removeprefix("True to ").replace("None", "unset") for name, text in texts.items()}
 

@@ -35,7 +35,7 @@ from tests.renderer.model_files import chunk, three_ds, three_ds_cube, three_ds_
 
 pytestmark = pytest.mark.usefixtures("plain_environment")
 
-COMMANDS = ("serve", "render", "scenes", "bench", "animate", "watch")
+COMMANDS = ("serve", "render", "scenes", "bench", "animate", "watch", "bridge")
 SMALL = ("--size", "96x54")
 RENDER = ("render", "spheres", "-o", "a.png")
 CUBE = """\

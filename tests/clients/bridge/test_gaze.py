@@ -21,7 +21,7 @@ from clients.bridge.calibration_walk import (
 from clients.bridge.clock import DeviceClock
 from clients.bridge.codec import MILLISECOND_NS
 from clients.bridge.errors import ConfigError
-from clients.bridge.gaze import Gaze, GazeOptions, GazePath
+from clients.bridge.gaze import SILENCE_NS, Gaze, GazeOptions, GazePath
 from clients.bridge.sample import Eye, Point, Sample
 from clients.bridge.screen import Origin, Place, Screen, Unit
 from clients.bridge.slot import MOST_CHANGES, TOO_OLD_NS, Slot
@@ -102,6 +102,20 @@ def test_a_loss_is_told_at_once_and_trust_returns_after_a_while() -> None:
 def test_a_second_loss_starts_the_wait_anew() -> None:
     gazes = run(path(pad_ns=20 * MILLISECOND_NS), [HERE, None, HERE, HERE, None, HERE, HERE, HERE, HERE, HERE, HERE])
     assert [gaze.valid for gaze in gazes] == [True] + [False] * 9 + [True]
+
+
+def test_an_eye_is_lost_when_no_sample_comes_and_that_is_said_once() -> None:
+    gaze_path = path()
+    assert gaze_path.missing(10**12, gone=True) is None
+    (last,) = run(gaze_path, [HERE])
+    assert gaze_path.missing(SILENCE_NS - 1) is None
+    gaze = gaze_path.missing(SILENCE_NS)
+    assert gaze is not None
+    assert (gaze.valid, gaze.seq, gaze.captured_ns) == (False, last.seq + 1, SILENCE_NS)
+    assert gaze_path.missing(SILENCE_NS + 1, gone=True) is None
+    gaze_path = path()
+    run(gaze_path, [HERE])
+    assert gaze_path.missing(1, gone=True) is not None
 
 
 def test_the_first_gaze_counts_at_once() -> None:
@@ -263,9 +277,9 @@ def test_the_newest_gaze_replaces_the_one_that_waits() -> None:
     slot = Slot()
     for seq in range(100):
         slot.put(gaze(seq))
-    assert len(slot) <= 2
-    assert [item.seq for item in slot.take(0)] == [0, 99]
-    assert slot.dropped == 98
+        assert len(slot) == 1
+    assert [item.seq for item in slot.take(0)] == [99]
+    assert slot.dropped == 99
     for seq in range(100, 200):
         slot.put(gaze(seq))
     assert [item.seq for item in slot.take(0)] == [199]
@@ -275,8 +289,10 @@ def test_the_newest_gaze_replaces_the_one_that_waits() -> None:
 @given(st.lists(st.tuples(st.booleans(), st.booleans()), max_size=60))
 def test_no_change_is_ever_lost_and_little_waits(steps: list[tuple[bool, bool]]) -> None:
     """Each step brings a gaze; some are followed by a send. What was sent changes as often as what was put."""
-    slot, sent, put = Slot(), [], []
-    for seq, (valid, take) in enumerate(steps):
+    slot, put = Slot(), [True]
+    slot.put(gaze(0))
+    sent = slot.take(0)
+    for seq, (valid, take) in enumerate(steps, 1):
         slot.put(gaze(seq, valid))
         put.append(valid)
         changes = len(runs(put))
@@ -308,9 +324,15 @@ def test_after_a_stall_only_changes_and_what_is_new_are_sent() -> None:
 
 def test_memory_is_bounded_and_a_new_listener_begins_with_the_newest() -> None:
     slot = Slot()
+    slot.put(gaze(0))
+    slot.take(0)
     for seq in range(4 * MOST_CHANGES):
-        slot.put(gaze(seq, seq % 2 == 0))
+        slot.put(gaze(seq, seq % 2 == 1))
     assert len(slot) == MOST_CHANGES
     slot.clear()
+    for seq in range(5):
+        slot.put(gaze(seq, seq % 2 == 0))
+    assert [item.seq for item in slot.take(0)] == [4]
+    slot.clear()
     slot.put(gaze(7))
-    assert [item.seq for item in slot.take(TOO_OLD_NS * 2)] == [7]
+    assert slot.take(TOO_OLD_NS + 1) == []

@@ -1,0 +1,65 @@
+"""The protocols by name, each with its options."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from clients.bridge.asl import Asl
+from clients.bridge.codec import Codec
+from clients.bridge.config import Config
+from clients.bridge.csv_lines import CsvLines
+from clients.bridge.errors import ConfigError
+from clients.bridge.eyetribe import EyeTribe
+from clients.bridge.gazepoint import Gazepoint
+from clients.bridge.iscan import IscanAscii, IscanBinary
+from clients.bridge.json_lines import JsonLines
+from clients.bridge.pattern_lines import PatternLines
+from clients.bridge.sample import Eye
+from clients.bridge.screen import Unit
+from clients.bridge.smi import Smi
+
+PROTOCOLS: dict[str, Callable[[Config], Codec]] = {
+    "smi": lambda config: Smi(config.smi_format),
+    "asl": lambda config: Asl(config.asl_counted, config.poll_byte),
+    "iscan": lambda config: IscanBinary(
+        config.iscan_parameters, config.iscan_columns, config.iscan_start, config.iscan_stop
+    ),
+    "iscan-ascii": lambda config: IscanAscii(
+        config.iscan_parameters, config.iscan_columns, config.iscan_start, config.iscan_stop
+    ),
+    "gazepoint": lambda _: Gazepoint(),
+    "eyetribe": lambda _: EyeTribe(),
+    "csv": lambda config: CsvLines(config.fields),
+    "jsonl": lambda config: JsonLines(config.paths or None),
+    "regex": lambda config: PatternLines(config.pattern),
+}
+
+
+def codec_of(config: Config) -> Codec:
+    """The protocol that the settings choose, with their options.
+
+    Raises:
+        ConfigError: for an unknown one, or options that do not fit it.
+    """
+    protocol = config.protocol
+    if protocol is None and (config.simulate or config.trace is not None):
+        protocol = Smi.name
+    if protocol not in PROTOCOLS:
+        raise ConfigError("protocol", f"one of {', '.join(PROTOCOLS)} (--probe finds out which)", protocol)
+    codec = PROTOCOLS[protocol](config)
+    apart = codec.binocular or isinstance(codec, CsvLines | JsonLines | PatternLines)
+    if config.eye is not Eye.BEST and not apart:
+        raise ConfigError("eye", f"best, because {protocol} does not tell eyes apart", str(config.eye))
+    return codec
+
+
+def unit_of(config: Config, codec: Codec) -> Unit:
+    """What the device's numbers count: as the settings say, else as its protocol does."""
+    return config.unit or Unit(codec.unit)
+
+
+def tick_lengths(config: Config, codec: Codec) -> tuple[float, ...]:
+    """How long a tick of the device's clock may be [ns]."""
+    if config.time_unit is not None:
+        return (config.time_unit,)
+    return codec.ticks_ns
