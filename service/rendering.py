@@ -290,7 +290,9 @@ class Studio:
 
 def library_versions() -> str:
     """Versions of what encodes and compiles: with the scene's version they decide the bytes of a picture."""
-    return " ".join(f"{package} {metadata.version(package)}" for package in ("embreex", "numba", "pillow"))
+    return " ".join(
+        f"{package} {metadata.version(package)}" for package in ("embreex", "numba", "pillow", "simplejpeg")
+    )
 
 
 def _shown(order: Order, frame: Frame) -> dict[str, object]:

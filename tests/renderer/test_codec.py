@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from PIL import Image
+from PIL import Image, JpegImagePlugin
 
 from renderer.codec import CONTENT_TYPE, FORMATS, decode_texture, encode
 from renderer.errors import SceneError, SettingsError
@@ -203,7 +203,7 @@ def test_damage_is_a_texture_or_a_scene_error(image_format: str) -> None:
 def test_warnings_of_the_image_library_become_errors_outside_tests_too() -> None:
     script = """
 import io, sys, warnings
-from PIL import Image
+from PIL import Image, JpegImagePlugin
 from renderer.codec import decode_texture
 from renderer.errors import SceneError
 buffer = io.BytesIO()
@@ -224,3 +224,9 @@ print(sorted(outcomes))
     run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=True)
     assert run.stdout.strip() == "['error', 'texture', 'warned']"
     assert run.stderr == ""
+
+
+@pytest.mark.parametrize(("quality", "sampling"), [(100, 0), (90, 0), (89, 2), (75, 2)])
+def test_jpeg_keeps_all_colour_at_high_quality(quality: int, sampling: int) -> None:
+    with Image.open(io.BytesIO(encode(gradient(), "jpeg", quality))) as image:
+        assert JpegImagePlugin.get_sampling(image) == sampling
