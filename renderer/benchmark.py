@@ -32,7 +32,7 @@ FRAME = "whole frame"
 BARE = "bare Embree"
 MAP = "cell map"
 TRACE = "trace"
-RECONSTRUCT = "reconstruct"
+RECONSTRUCT = "reconstruct and tone map"
 MOVED = "after a 20 px gaze move"
 STORED = "everything stored"
 """What is timed: the frame traced anew with its map cached and without encoding; Embree alone on the same
@@ -158,7 +158,15 @@ def _trace_bare(intersector: Intersector, recorder: _RecordingIntersector, pool:
 
 def _figures(times: dict[str, list[float]]) -> tuple[Figure, ...]:
     figures = [_figure(name, series, "ms") for name, series in times.items()]
-    for part, whole in ((FRAME, BARE), (MAP, BARE), (TRACE, BARE), (RECONSTRUCT, BARE), (MAP, FRAME), (MOVED, FRAME)):
+    for part, whole in (
+        (FRAME, BARE),
+        (MAP, BARE),
+        (TRACE, BARE),
+        (RECONSTRUCT, BARE),
+        (MAP, FRAME),
+        (RECONSTRUCT, FRAME),
+        (MOVED, FRAME),
+    ):
         ratios = [a / b for a, b in zip(times[part], times[whole], strict=True)]
         figures.append(_figure(f"{part} / {whole}", ratios, "ratio"))
     return tuple(figures)

@@ -106,22 +106,19 @@ def grow(
     Raises:
         Abandoned: if the pool's jobs end early.
     """
-    found = np.zeros(cell_map.cells, dtype=np.int32)
-    had = np.zeros(cell_map.cells, dtype=np.int32)
-    missing, held, fewest = missing_cells(store.samples, store.spread, slots, wanted, found, had)
-    chosen, first = found[:missing], had[:missing]
-    asked = wanted * missing - int(first.sum())
+    chosen, first, held, fewest = missing_cells(store, slots, wanted, pool)
+    asked = wanted * len(chosen) - int(first.sum())
     tracer = _Tracer(prepared, view, store, quality, pool)
     squares = Squares(cell_map.x, cell_map.y, cell_map.side, slots)
     if quality.antialiasing == "adaptive":
         verdicts = Verdicts(cell_map, slots, store, prepared.scene.exposure, pool)
-        missing, traced = _trace_rounds(tracer, verdicts, squares, chosen, wanted)
+        cells, traced = _trace_rounds(tracer, verdicts, squares, chosen, wanted)
         least = min(wanted, FIRST_ROUND)
     else:
-        traced = tracer.trace(squares, chosen, first, np.full(missing, wanted, dtype=np.int32))
+        cells, traced = len(chosen), tracer.trace(squares, chosen, first, np.full_like(first, wanted))
         least = wanted
     return Growth(
-        missing, tracer.samples, asked, tracer.rays, tracer.rejected, held + traced, max(fewest, least), tracer.trace_ns
+        cells, tracer.samples, asked, tracer.rays, tracer.rejected, held + traced, max(fewest, least), tracer.trace_ns
     )
 
 

@@ -57,7 +57,7 @@ class Memory:
 
         def build() -> NumberedMap:
             cells = build_cell_map(quality.map, display, quality.acuity, _bucket(quality, gaze), pool)
-            return NumberedMap(cells, slots_of(cells))
+            return NumberedMap(cells, slots_of(cells, pool))
 
         return self.maps.get(_map_key(display, quality, gaze), build)
 

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from renderer.cellmap import CellMap
 from renderer.frame import Abandoned
 from renderer.kernel import kernel
+from renderer.workers import Workers
 
 LUMINANCE = (0.2126, 0.7152, 0.0722)
 """Weights of red, green and blue (Rec. 709)."""
@@ -27,6 +28,9 @@ BRIGHTEST = np.float32(1e16)
 
 FIRST_ROUND = 4
 """Samples that every cell gets before it is decided which ones get more."""
+
+CHUNK_CELLS = 65_536
+"""Cells looked up together."""
 
 ABANDON_POLL_S = 0.005
 """How often whoever waits for a store looks whether to go on waiting [s]."""
@@ -111,16 +115,23 @@ def aligned_slots(width: int, height: int) -> int:
     return int(aligned_levels(width, height)[1][-1])
 
 
-def slots_of(cell_map: CellMap) -> NDArray[np.int64]:
+def slots_of(cell_map: CellMap, pool: Workers) -> NDArray[np.int64]:
     """(n,) int64 slot of each cell: by side, row and column for aligned and full maps, else its number."""
     if cell_map.kind == "scanline":
         return np.arange(cell_map.cells)
     height, width = cell_map.mask.shape
     slots = np.zeros(cell_map.cells, dtype=np.int64)
     sides, starts = aligned_levels(width, height)
-    level = np.zeros(int(sides[-1]) + 1, dtype=np.int32)
-    level[sides] = np.arange(len(sides))
-    _find_slots(cell_map.x, cell_map.y, cell_map.side, level, starts, width, slots)
+    first = np.zeros(int(sides[-1]) + 1, dtype=np.int64)
+    columns = np.zeros_like(first)
+    inverse = np.zeros(len(first), dtype=np.float64)
+    first[sides], columns[sides], inverse[sides] = starts[:-1], -(-width // sides), 1.0 / sides
+
+    def find(chunk: int) -> None:
+        part = slice(chunk * CHUNK_CELLS, (chunk + 1) * CHUNK_CELLS)
+        _find_slots(cell_map.x[part], cell_map.y[part], cell_map.side[part], first, columns, inverse, slots[part])
+
+    pool.run(find, -(-cell_map.cells // CHUNK_CELLS))
     return slots
 
 
@@ -144,50 +155,90 @@ def _find_slots(
     x: NDArray[np.int32],
     y: NDArray[np.int32],
     side: NDArray[np.int32],
-    level: NDArray[np.int32],
-    starts: NDArray[np.int64],
-    width: int,
+    first: NDArray[np.int64],
+    columns: NDArray[np.int64],
+    inverse: NDArray[np.float64],
     slots: NDArray[np.int64],
 ) -> None:
+    """Write the slots of cells; tables by side hold the first slot, squares in a row and 1 / side.
+
+    Half a pixel keeps products with the rounded inverse clear of whole numbers, which divisions would be slower at.
+    """
     for cell in range(len(slots)):
         length = side[cell]
-        columns = -(-width // length)
-        slots[cell] = starts[level[length]] + (y[cell] // length) * columns + x[cell] // length
+        row, column = int((y[cell] + 0.5) * inverse[length]), int((x[cell] + 0.5) * inverse[length])
+        slots[cell] = first[length] + row * columns[length] + column
+
+
+class Missing(NamedTuple):
+    """Cells that lack samples.
+
+    Attributes:
+        cells: (m,) int32, rising.
+        first: (m,) int32 how many samples each of them has.
+        held: samples of all cells that were looked at, missing or not.
+        fewest: samples of the cell that has fewest.
+    """
+
+    cells: NDArray[np.int32]
+    first: NDArray[np.int32]
+    held: int
+    fewest: int
+
+
+def missing_cells(store: SampleStore, slots: NDArray[np.int64], wanted: int, pool: Workers) -> Missing:
+    """The cells that have fewer than `wanted` samples and are not settled.
+
+    Args:
+        store: what they have.
+        slots: (n,) int64 slot of each cell, n at least 1.
+        wanted: samples a cell.
+        pool: threads; the result does not depend on their number.
+    """
+    cells = np.zeros(len(slots), dtype=np.int32)
+    first = np.zeros(len(slots), dtype=np.int32)
+    number, settled = store.samples.number, store.spread.settled
+    starts = range(0, len(slots), CHUNK_CELLS)
+    counts = np.zeros((len(starts), 3), dtype=np.int64)
+
+    def find(chunk: int) -> None:
+        start = starts[chunk]
+        part = slice(start, start + CHUNK_CELLS)
+        _find_missing(number, settled, slots[part], start, wanted, cells[part], first[part], counts[chunk])
+
+    pool.run(find, len(starts))
+    parts = [slice(start, start + count) for start, count in zip(starts, counts[:, 0], strict=True)]
+    return Missing(
+        np.concatenate([cells[part] for part in parts]),
+        np.concatenate([first[part] for part in parts]),
+        int(counts[:, 1].sum()),
+        int(counts[:, 2].min()),
+    )
 
 
 @kernel
-def missing_cells(
-    samples: Samples,
-    spread: Spread,
+def _find_missing(
+    number: NDArray[np.int32],
+    settled: NDArray[np.uint8],
     slots: NDArray[np.int64],
+    first_cell: int,
     wanted: int,
     missing: NDArray[np.int32],
     first: NDArray[np.int32],
-) -> tuple[int, int, int]:
-    """List the cells that have fewer than `wanted` samples and are not settled.
-
-    Args:
-        samples, spread: the store.
-        slots: (n,) int64 slot of each cell.
-        wanted: samples a cell.
-        missing: (n,) int32, the first of them written: the cells.
-        first: (n,) int32, as many written: how many samples each of them has.
-
-    Returns:
-        How many are missing, how many samples there are in all cells, and the fewest in any.
-    """
-    count, settled = samples.number, spread.settled
+    counts: NDArray[np.int64],
+) -> None:
+    """Write the missing ones of the cells from `first_cell` on, their samples, and number, sum and minimum."""
     found = held = 0
     fewest = np.int32(2**31 - 1)
     for cell in range(len(slots)):
-        number = count[slots[cell]]
-        held += number
-        fewest = min(fewest, number)
-        if number < wanted and (len(settled) == 0 or settled[slots[cell]] == 0):
-            missing[found] = cell
-            first[found] = number
+        known = number[slots[cell]]
+        held += known
+        fewest = min(fewest, known)
+        if known < wanted and (len(settled) == 0 or settled[slots[cell]] == 0):
+            missing[found] = first_cell + cell
+            first[found] = known
             found += 1
-    return found, held, int(fewest)
+    counts[0], counts[1], counts[2] = found, held, fewest
 
 
 def held_by_number(

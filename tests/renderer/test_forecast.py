@@ -12,6 +12,7 @@ from renderer.gaze import Gaze, bucket_of
 from renderer.pipeline import Renderer
 from renderer.quality import Quality
 from renderer.store import aligned_slots, held_by_number, slots_of
+from renderer.workers import WorkerPool
 
 SCREEN = Display(960, 540, 50.0, 35.0, 60.0)
 NOTHING, NO_FLAGS = np.zeros(0, np.int32), np.zeros(0, np.uint8)
@@ -32,15 +33,15 @@ def test_cells_are_counted_within_some_percent(
 
 
 @pytest.mark.parametrize("move_px", [0, 20, 100, 400])
-def test_cells_that_are_there_after_a_move_are_found(renderer: Renderer, move_px: int) -> None:
+def test_cells_that_are_there_after_a_move_are_found(renderer: Renderer, pool: WorkerPool, move_px: int) -> None:
     """Every cell of a map holds 2 samples, a third of them 9; then the gaze moves."""
     quality = Quality(acuity=Acuity(scale=2.0))
     number = np.zeros(aligned_slots(960, 540), np.int32)
-    slots = slots_of(renderer.cell_map(SCREEN, quality, Gaze(300, 200))[0])
+    slots = slots_of(renderer.cell_map(SCREEN, quality, Gaze(300, 200))[0], pool)
     number[slots] = 2
     number[slots[::3]] = 9
     gaze = Gaze(300 + move_px, 200)
-    truth = held_by_number(number, NO_FLAGS, slots_of(renderer.cell_map(SCREEN, quality, gaze)[0]), 4)
+    truth = held_by_number(number, NO_FLAGS, slots_of(renderer.cell_map(SCREEN, quality, gaze)[0], pool), 4)
     forecast = forecast_held(SCREEN, quality.acuity, bucket_of(gaze, 16), number, NO_FLAGS, 4)
     np.testing.assert_allclose(forecast / forecast.sum(), truth / truth.sum(), atol=0.04)
 

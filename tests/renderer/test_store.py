@@ -16,6 +16,7 @@ from renderer.pipeline import Renderer
 from renderer.quality import Quality
 from renderer.store import (
     BRIGHTEST,
+    CHUNK_CELLS,
     LUMINANCE,
     SampleStore,
     add_samples,
@@ -25,6 +26,7 @@ from renderer.store import (
     slots_needed,
     slots_of,
 )
+from renderer.workers import WorkerPool
 
 NEAR = Display(96, 54, width_cm=5.0)
 COARSE = Acuity(scale=15.0)
@@ -48,13 +50,13 @@ def test_sides_are_powers_of_two_and_three_times_them() -> None:
 @settings(max_examples=30)
 @given(st.lists(st.tuples(st.floats(-50, 150), st.floats(-50, 100)), min_size=2, max_size=6))
 def test_a_cell_has_the_same_place_for_every_gaze_and_no_other_cell_has_it(
-    renderer: Renderer, gazes: list[tuple[float, float]]
+    renderer: Renderer, pool: WorkerPool, gazes: list[tuple[float, float]]
 ) -> None:
     """Also where squares of one side could begin in the middle of those of another."""
     cell_of_slot: dict[int, tuple[int, int, int]] = {}
     for gaze in gazes:
         cells = cell_map(renderer, "aligned", gaze)
-        slots = slots_of(cells)
+        slots = slots_of(cells, pool)
         assert slots.min() >= 0
         assert slots.max() < slots_needed(cells) == aligned_slots(96, 54)
         for slot, identity in zip(slots.tolist(), identities(cells), strict=True):
@@ -68,20 +70,22 @@ def test_the_maps_tried_here_have_cells_of_many_sides(renderer: Renderer) -> Non
 
 
 @pytest.mark.parametrize("size", [(1, 1), (1, 9), (9, 1), (17, 13), (96, 54)])
-def test_full_maps_share_the_places_of_single_pixels(renderer: Renderer, size: tuple[int, int]) -> None:
+def test_full_maps_share_the_places_of_single_pixels(
+    renderer: Renderer, pool: WorkerPool, size: tuple[int, int]
+) -> None:
     display = Display(*size, width_cm=5.0)
     cells = cell_map(renderer, "full", (0, 0), display)
-    slots = slots_of(cells)
+    slots = slots_of(cells, pool)
     assert len(set(slots.tolist())) == cells.cells == display.pixels
     aligned = cell_map(renderer, "aligned", (size[0] / 2, size[1] / 2), display)
     place = dict(zip(identities(cells), slots.tolist(), strict=True))
-    for identity, slot in zip(identities(aligned), slots_of(aligned).tolist(), strict=True):
+    for identity, slot in zip(identities(aligned), slots_of(aligned, pool).tolist(), strict=True):
         assert identity[0] > 1 or place[identity] == slot
 
 
-def test_scanline_cells_have_places_of_their_map_only(renderer: Renderer) -> None:
+def test_scanline_cells_have_places_of_their_map_only(renderer: Renderer, pool: WorkerPool) -> None:
     cells = cell_map(renderer, "scanline", (10, 10))
-    np.testing.assert_array_equal(slots_of(cells), np.arange(cells.cells))
+    np.testing.assert_array_equal(slots_of(cells, pool), np.arange(cells.cells))
     assert slots_needed(cells) == cells.cells
 
 
@@ -119,15 +123,40 @@ def test_cells_get_different_numbers_of_samples() -> None:
     np.testing.assert_allclose(store.samples.total[0], radiance[4:].sum(axis=0), rtol=1e-6)
 
 
-def test_cells_with_too_few_samples_are_missing() -> None:
+def test_cells_with_too_few_samples_are_missing(pool: WorkerPool) -> None:
     store = sample(np.ones((2, 4, 3), np.float32), 4)
     store.samples.number[1] = 3
-    slots, missing, first = np.array([5, 1, 2, 0]), np.zeros(4, np.int32), np.zeros(4, np.int32)
-    assert missing_cells(store.samples, store.spread, slots, 4, missing, first) == (2, 11, 0)
-    assert (missing[:2].tolist(), first[:2].tolist()) == ([1, 3], [3, 0])
-    assert missing_cells(store.samples, store.spread, slots, 1, missing, first) == (1, 11, 0)
-    assert missing_cells(store.samples, store.spread, slots, 5, missing, first)[0] == 4
-    assert missing_cells(store.samples, store.spread, slots[:3], 2, missing, first) == (0, 11, 3)
+    slots = np.array([5, 1, 2, 0])
+
+    def missing(some: NDArray[np.int64], wanted: int) -> tuple[list[int], list[int], int, int]:
+        found = missing_cells(store, some, wanted, pool)
+        return found.cells.tolist(), found.first.tolist(), found.held, found.fewest
+
+    assert missing(slots, 4) == ([1, 3], [3, 0], 11, 0)
+    assert missing(slots, 1) == ([3], [0], 11, 0)
+    assert missing(slots, 5) == ([0, 1, 2, 3], [4, 3, 4, 0], 11, 0)
+    assert missing(slots[:3], 2) == ([], [], 11, 3)
+
+
+def test_settled_cells_are_not_missing(pool: WorkerPool) -> None:
+    store = SampleStore(3, adaptive=True)
+    store.samples.number[:] = (4, 4, 8)
+    store.spread.settled[:] = (0, 1, 0)
+    found = missing_cells(store, np.array([2, 1, 0]), 9, pool)
+    assert (found.cells.tolist(), found.first.tolist(), found.held, found.fewest) == ([0, 2], [8, 4], 16, 4)
+
+
+def test_what_is_missing_is_found_in_parts_and_in_order(pool: WorkerPool) -> None:
+    """Several chunks, against a look at all cells at once."""
+    cells = 3 * CHUNK_CELLS + 17
+    rng = np.random.default_rng(0)
+    store, slots = SampleStore(cells), rng.permutation(cells)
+    store.samples.number[:] = rng.integers(0, 4, cells)
+    found = missing_cells(store, slots, 3, pool)
+    number = store.samples.number[slots]
+    np.testing.assert_array_equal(found.cells, np.flatnonzero(number < 3))
+    np.testing.assert_array_equal(found.first, number[number < 3])
+    assert (found.held, found.fewest) == (number.sum(), 0)
 
 
 @pytest.mark.parametrize("bad", [np.nan, -1e-9, -np.inf])
