@@ -57,23 +57,31 @@ def _forget_old_versions(place: Path) -> None:
 numba.config.CACHE_DIR = str(_cache_folder())  # type: ignore[attr-defined]
 
 
+_OPTIONS: dict[str, Any] = {"nogil": True, "cache": True, "error_model": "numpy"}
+_MAKES_NO_ARRAYS: dict[str, Any] = {"_nrt": False}
+
+
 def kernel(function: _F) -> _F:
     """Compile a loop over arrays it is given; it runs without the interpreter lock and is cached on disk.
 
     It can make no arrays of its own (numba's run-time for them stays out). In return an array can be taken out
-    of a record anywhere, even for each ray: otherwise that counts references, which made shading three times slower.
+    of a record anywhere, even for each ray: otherwise that counts references, which made shading twice as slow.
     """
-    options: dict[str, Any] = {"nogil": True, "cache": True, "error_model": "numpy", "_nrt": False}
-    return cast(_F, numba.njit(**options)(function))
+    return cast(_F, numba.njit(**_OPTIONS, **_MAKES_NO_ARRAYS)(function))
 
 
-formula = kernel
-"""The same for a small function of numbers that kernels call."""
+def formula(function: _F) -> _F:
+    """The same for a small function of numbers, written out wherever a kernel calls it.
+
+    Left to itself the compiler calls the larger ones, and handing over a surface and a few arrays for each ray
+    took as long as the arithmetic.
+    """
+    return cast(_F, numba.njit(**_OPTIONS, **_MAKES_NO_ARRAYS, forceinline=True)(function))
 
 
 def roomy_kernel(function: _F) -> _F:
     """A kernel that makes arrays of its own; it should take others out of their records before its loops."""
-    return cast(_F, numba.njit(nogil=True, cache=True, error_model="numpy")(function))
+    return cast(_F, numba.njit(**_OPTIONS)(function))
 
 
 def _prefetch(_context: Any, rows: Any, row: Any) -> Any:

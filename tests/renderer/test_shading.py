@@ -43,7 +43,7 @@ def moved(mesh: Mesh, factor: float, offset: Rgb = (0, 0, 0)) -> Mesh:
 @pytest.mark.parametrize(("x", "h"), [(0.0, 1.0), (1.0, 1.0), (3.0, 2.0), (4.0, 0.01), (0.0, 4000.0)])
 @pytest.mark.parametrize("casts", [True, False])
 def test_h35_a_light_over_a_plane(renderer: Renderer, x: float, h: float, casts: bool) -> None:
-    kd, intensity = 0.8, 7.0
+    kd, intensity = 0.8, 7.0 * max(1.0, h * h)
     ground = floor(Material(diffuse=(kd,) * 3), casts_shadows=casts)
     seen = pixel(renderer, Scene(meshes=(ground,), lights=(light(x, h, 0, intensity),), camera=DOWN))
     assert seen == pytest.approx(kd / math.pi * intensity * h / (x * x + h * h) ** 1.5, rel=8 * U)
