@@ -59,7 +59,7 @@ def ashikhmin_shirley(
 
     Args:
         nx, ny, nz: unit shading normal.
-        ux, uy, uz: unit tangent; matters only where the exponents differ.
+        ux, uy, uz: unit tangent; any vector, 0 too, where the exponents are equal.
         nu, nv: exponents along and across the tangent.
         lx, ly, lz: unit direction to the light, above the shading normal's horizon.
         vx, vy, vz: unit direction to the eye.
@@ -76,10 +76,14 @@ def ashikhmin_shirley(
     if not up > 0.0:
         return 0.0, 0.0, matt
     hx, hy, hz = hx / length, hy / length, hz / length
-    along = hx * ux + hy * uy + hz * uz
-    across = hx * (ny * uz - nz * uy) + hy * (nz * ux - nx * uz) + hz * (nx * uy - ny * ux)
+    sx, sy, sz = ny * hz - nz * hy, nz * hx - nx * hz, nx * hy - ny * hx
+    along_squared, across_squared = sx * sx + sy * sy + sz * sz, 0.0
+    if nu != nv:
+        along = hx * ux + hy * uy + hz * uz
+        across = hx * (ny * uz - nz * uy) + hy * (nz * ux - nx * uz) + hz * (nx * uy - ny * ux)
+        along_squared, across_squared = along * along, across * across
     half_cosine = min(1.0, 0.5 * length)
-    power = lobe_power(along * along, across * across, up, nu, nv)
+    power = lobe_power(along_squared, across_squared, up, nu, nv)
     scale = math.sqrt((nu + 1.0) * (nv + 1.0)) / (8.0 * math.pi)
     highlight = scale * power / half_cosine * (toward_light / max(toward_light, toward_eye))
     return highlight, fifth(1.0 - half_cosine), matt

@@ -1,4 +1,4 @@
-"""A gallery: polished metals, marble and wood on plinths, pictures on the walls.
+"""A gallery: turned and polished metals, marble and wood on plinths, pictures on the walls.
 
 The room is 9 m wide, 12 m long and 4.4 m high, with x across and the camera looking towards -z.
 """
@@ -43,7 +43,9 @@ def gallery() -> Scene:
     return Scene(
         meshes=(*_room(), *_pictures(), _plinths(), *_objects()),
         spheres=(
-            Sphere((ball_x, ball_y + 0.40, ball_z), 0.36, _metal("steel", (0.88, 0.90, 0.92), 0.9, 500.0)),
+            Sphere(
+                (ball_x, ball_y + 0.40, ball_z), 0.36, _metal("turned steel", (0.88, 0.90, 0.92), 0.45, 2000.0, 14.0)
+            ),
             Sphere((stone_x, stone_y + 0.36, stone_z), 0.33, marble),
         ),
         lights=(
@@ -126,20 +128,20 @@ def _objects() -> list[Mesh]:
     """What stands on the plinths, but for the two spheres."""
     glaze = _polished("painted glaze", patterns.starry((26, 60, 130), (238, 232, 214), 6, 67), 120.0, 0.05)
     walnut = textured("walnut", patterns.wood((160, 104, 62), (74, 42, 22), 68, planks=2))
-    brass = _metal("brass", (0.84, 0.66, 0.32), 0.55, 90.0)
-    steel = _metal("brushed steel", (0.66, 0.67, 0.69), 0.45, 60.0)
+    brass = _metal("turned brass", (0.90, 0.70, 0.34), 0.50, 900.0, 14.0)
+    steel = _metal("brushed steel", (0.72, 0.73, 0.75), 0.30, 700.0, 10.0)
     globe, orbits = _armillary()
     stand = torus(0.17, 0.03, 48, 16)
     return [
-        _on("knot", _torus_knot().moved(0.0, 0.52, 0.0)).mesh(_metal("gold", (1.0, 0.76, 0.34), 0.72, 220.0)),
+        _on("knot", _torus_knot().moved(0.0, 0.52, 0.0)).mesh(_metal("gold", (0.95, 0.70, 0.28), 0.72, 500.0, 500.0)),
         _on("knot", lathe([(0.0, 0.0), (0.20, 0.0), (0.18, 0.03), (0.05, 0.05), (0.04, 0.16), (0.0, 0.16)], 48)).mesh(
             steel
         ),
-        _on("urn", ornament.urn(0.95, 96, 16)).mesh(_metal("copper", (0.93, 0.56, 0.42), 0.6, 120.0)),
+        _on("urn", ornament.urn(0.95, 96, 16)).mesh(_metal("turned copper", (0.90, 0.48, 0.33), 0.5, 900.0, 12.0)),
         _on("armillary", orbits).mesh(brass),
-        _on("armillary", globe).mesh(_metal("blue steel", (0.30, 0.42, 0.66), 0.5, 150.0)),
+        _on("armillary", globe).mesh(_metal("blue steel", (0.34, 0.48, 0.76), 0.35, 8.0, 800.0)),
         _on("vase", _vase()).mesh(glaze, 0.5),
-        _on("figure", ornament.statue(1.25, 96)).mesh(_metal("bronze", (0.58, 0.40, 0.22), 0.28, 45.0)),
+        _on("figure", ornament.statue(1.25, 96)).mesh(_metal("bronze", (0.44, 0.29, 0.15), 0.45, 60.0, 60.0)),
         join(_on("mirror ball", stand.moved(0.0, 0.03, 0.0)), _on("marble ball", stand.moved(0.0, 0.03, 0.0))).mesh(
             brass
         ),
@@ -163,16 +165,18 @@ def _polished(name: str, pixels: patterns.Pixels, shininess: float, mirror: floa
     )
 
 
-def _metal(name: str, tint: Rgb, polish: float, shininess: float) -> Material:
-    """A metal whose mirror share is `polish` of its tint, the rest a dim gloss."""
+def _metal(name: str, tint: Rgb, polish: float, exponent_u: float, exponent_v: float) -> Material:
+    """A metal that mirrors `polish` of its tint sharply and scatters the rest along its grain."""
     red, green, blue = tint
-    gloss = 1.4 * (1.0 - polish)
+    rest = 1.0 - polish
     return Material(
         name,
-        diffuse=(0.22 * red, 0.22 * green, 0.22 * blue),
-        specular=(gloss * red, gloss * green, gloss * blue),
-        shininess=shininess,
+        diffuse=(0.25 * rest * red, 0.25 * rest * green, 0.25 * rest * blue),
+        specular=(rest * red, rest * green, rest * blue),
         reflection=(polish * red, polish * green, polish * blue),
+        base="ashikhmin-shirley",
+        exponent_u=exponent_u,
+        exponent_v=exponent_v,
     )
 
 
