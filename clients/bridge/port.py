@@ -6,6 +6,7 @@ import errno
 import re
 import termios
 import time
+from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
@@ -109,10 +110,9 @@ class SerialPort:
     def read(self) -> Chunk | None:
         """What has come; None after a short wait without a byte. Raises PortError."""
         try:
-            if self._socket:
-                data = self._read_socket()
-            else:
-                data = self._port.read(max(1, self._port.in_waiting))
+            data: bytes = self._port.read(1)
+            if data:
+                data += self._rest()
         except FAILURES as error:
             raise PortError(f"{self._url}: {reason(error)}") from None
         return Chunk(data, time.monotonic_ns()) if data else None
@@ -131,18 +131,19 @@ class SerialPort:
         except FAILURES:
             return
 
-    def _read_socket(self) -> bytes:
-        """One byte, then what came with it: of a socket pyserial only says whether there is any."""
-        data: bytes = self._port.read(1)
-        if data:
-            self._port.timeout = 0
-            try:
-                data += self._port.read(MOST_AT_ONCE)
-            except serial.SerialException:
-                return data  # the next call fails in the same way, and nothing that came is lost
-            finally:
-                self._port.timeout = WAIT_S
-        return data
+    def _rest(self) -> bytes:
+        """What came with the first byte; if the port goes away now the next call fails, and nothing is lost."""
+        rest = b""
+        with suppress(*FAILURES):
+            if not self._socket:
+                rest = self._port.read(self._port.in_waiting)
+            else:  # of a socket pyserial only says whether there is anything
+                self._port.timeout = 0
+                try:
+                    rest = self._port.read(MOST_AT_ONCE)
+                finally:
+                    self._port.timeout = WAIT_S
+        return rest
 
     def _ask_for_low_latency(self) -> None:
         """USB adapters hold bytes back for 16 ms unless asked not to; not every driver can."""

@@ -27,8 +27,10 @@ LONGEST_HEADER = 64 << 10
 HEAD = struct.Struct("<IqB")
 CHECKSUM = struct.Struct("<I")
 LONGEST_CHUNK = 1 << 20
+GATHER_S = 0.1
+"""Chunks are written so many seconds' worth at a time: a thread that woke for each would delay the one that reads."""
 FLUSH_S = 1.0
-"""A crash costs at most the last second."""
+"""A crash costs little more than the last second."""
 
 DATA, BEGINS = 0, 1
 """Kinds: bytes that follow the ones before, and bytes of a port that was just opened."""
@@ -55,7 +57,8 @@ class Recorder:
         header = {"format": FORMAT, "monotonic_ns": time.monotonic_ns(), "unix_ns": time.time_ns(), **about}
         self._file.write(json.dumps(header).encode("ascii") + b"\n")
         self._file.flush()
-        self._queue: queue.SimpleQueue[Chunk | None] = queue.SimpleQueue()
+        self._queue: queue.SimpleQueue[Chunk] = queue.SimpleQueue()
+        self._closing = threading.Event()
         self.error: str | None = None
         self.bytes_written = 0
         self._thread = threading.Thread(target=self._write_all, name="recorder", daemon=True)
@@ -67,7 +70,7 @@ class Recorder:
 
     def close(self) -> None:
         """Write what waits, and close the file."""
-        self._queue.put(None)
+        self._closing.set()
         self._thread.join()
 
     def _write_all(self) -> None:
@@ -80,19 +83,22 @@ class Recorder:
                 self._file.close()
 
     def _write_until_closed(self) -> None:
-        flushed = time.monotonic()
-        while True:
-            with suppress(queue.Empty):
-                chunk = self._queue.get(timeout=FLUSH_S)
-                if chunk is None:
-                    break
-                self._file.write(framed(chunk))
-                self.bytes_written += len(chunk.data)
+        flushed, closing = time.monotonic(), False
+        while not closing:
+            closing = self._closing.wait(GATHER_S)
+            self._write_waiting()
             if time.monotonic() - flushed >= FLUSH_S:
                 self._file.flush()
                 flushed = time.monotonic()
         self._file.flush()
         os.fsync(self._file.fileno())
+
+    def _write_waiting(self) -> None:
+        with suppress(queue.Empty):
+            while True:
+                chunk = self._queue.get_nowait()
+                self._file.write(framed(chunk))
+                self.bytes_written += len(chunk.data)
 
 
 class Recording(NamedTuple):
