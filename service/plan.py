@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from renderer.acuity import MAX_SCALE
 from renderer.frame import FrameCost, FrameRequest
 from renderer.gaze import Gaze, GazeBucket
 from renderer.prepared import PreparedScene
@@ -158,5 +159,5 @@ def _quality(quality: Quality, look: Look) -> Quality:
         return quality
     if look.bucket is None:
         return replace(quality, map="aligned", acuity=replace(quality.acuity, margin_deg=EVERYWHERE_DEG))
-    scale = quality.acuity.scale * (SACCADE_SCALE if look.saccade else 1.0)
+    scale = min(quality.acuity.scale * SACCADE_SCALE, MAX_SCALE) if look.saccade else quality.acuity.scale
     return replace(quality, acuity=replace(quality.acuity, margin_deg=look.margin_deg, scale=scale))

@@ -200,7 +200,9 @@ class Session:
             in_force.order.scene_id,
             asdict(request.display),
             asdict(request.camera or prepared.scene.camera),
-            tuple(protocol.Effect(effect.name, effect.reason) for effect in prepared.plan.effects),
+            tuple(
+                protocol.Effect(effect.name, effect.reason[: protocol.LONGEST_TEXT]) for effect in prepared.plan.effects
+            ),
             self._clock(),
         )
 
@@ -298,7 +300,7 @@ class Session:
         cost, steps = rendered.frame.cost, steps_of(configuration, progress.look)
         progress.steps = steps_done(step, cost, progress.steps, steps)
         if progress.steps >= steps and step.format in UNCHANGED_FORMATS and not progress.look.saccade:
-            step = replace(step, phase="final")
+            step, progress.over = replace(step, phase="final"), True
         if step.phase == "moving":
             self._encode_ms += ENCODE_GAIN * (encoded.encode_ms - self._encode_ms)
             self._stage.studio.metrics.moved((encoded.finished_ns - asked_ns) / NS_PER_MS)
@@ -396,7 +398,7 @@ class Session:
 
     async def _woken(self, rendering: asyncio.Future[Any] | None = None) -> None:
         """Return when there may be something to do."""
-        waiting = self._progress is not None and not self._progress.over
+        waiting = bool(self.viewers) and self._progress is not None and not self._progress.over
         timed = waiting or next_change_ns(self.attention) is not None or self._refusal is not None
         woken = asyncio.ensure_future(self._wake.wait())
         try:

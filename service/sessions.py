@@ -122,7 +122,7 @@ class Sessions:
         session = Session(name, self.stage, self.clock)
         self._sessions[name] = session
         self._work[name] = asyncio.create_task(session.run(), name=f"gazetrace-session-{name}")
-        self._work[name].add_done_callback(lambda work: _ended(session, work))
+        self._work[name].add_done_callback(lambda work: self._ended(session, work))
         return session
 
     def _make_room(self) -> None:
@@ -136,6 +136,14 @@ class Sessions:
         del self._sessions[session.name]
         self._work.pop(session.name).cancel()
 
+    def _ended(self, session: Session, work: asyncio.Task[None]) -> None:
+        """Let the clients of a session that failed by a mistake of ours come back to a new one."""
+        if work.cancelled() or (error := work.exception()) is None:
+            return
+        log.error("session %s failed", session.name, exc_info=error)
+        self._forget(session)
+        session.close(CloseCode.TRY_LATER, "a mistake of the service; its log says more")
+
     async def _sweep(self) -> None:
         while True:
             await asyncio.sleep(SWEEP_S)
@@ -145,10 +153,3 @@ class Sessions:
 def _require_room(taken: int, most: int, what: str) -> None:
     if taken >= most:
         raise TooMany(f"this session has its {most} {what} already")
-
-
-def _ended(session: Session, work: asyncio.Task[None]) -> None:
-    """Let the clients of a session that failed by a mistake of ours come back to a new one."""
-    if not work.cancelled() and (error := work.exception()) is not None:
-        log.error("session %s failed", session.name, exc_info=error)
-        session.close(CloseCode.TRY_LATER, "a mistake of the service; its log says more")
