@@ -33,6 +33,9 @@ examples:
   gazetrace bench spheres --samples 4 --size 1280x720 --repeats 15
       Another scene and frame, everything timed 15 times.
 
+  gazetrace bench gallery --effect-costs
+      What each effect costs: the frame as planned, with every effect on, and without each.
+
   gazetrace bench --full --threads 1 --json
       Full resolution on one core, as JSON."""
 
@@ -56,6 +59,9 @@ def add(commands: argparse._SubParsersAction[Any]) -> None:
     parser.add_argument(
         "--repeats", type=int, default=7, metavar="N", help="how often everything is timed (default %(default)s)"
     )
+    parser.add_argument(
+        "--effect-costs", action="store_true", help="time the frame with its effects forced on and off instead"
+    )
     parser.add_argument("--json", action="store_true", help="print JSON")
     add_threads(parser)
     add_scenes_folder(parser)
@@ -69,18 +75,39 @@ def run(arguments: argparse.Namespace) -> int:
     check_threads(arguments.threads)
     frame_request(arguments, Camera())  # complain about a flag before a scene takes seconds to load
     prepared = load_scene(arguments.scene, arguments.scenes_folder)
-    if prepared.scene.triangles == 0:
+    if prepared.scene.triangles == 0 and not arguments.effect_costs:
         raise UsageError(f"{arguments.scene}: expected a scene with triangles to time Embree on, found none")
     request = frame_request(arguments, prepared.scene.camera)
     renderer = ready_renderer(arguments.threads)
     with counting(f"measuring {arguments.scene}", arguments.repeats) as tick:
-        from renderer.benchmark import measure_frame
+        if arguments.effect_costs:
+            from renderer.effect_benchmark import measure_effects
 
-        result = measure_frame(renderer, prepared, request, arguments.repeats, tick)
+            costs = measure_effects(renderer, prepared, request, arguments.repeats, tick)
+            record = {"costs": [asdict(cost) for cost in costs]}
+        else:
+            from renderer.benchmark import measure_frame
+
+            record = bench_record(measure_frame(renderer, prepared, request, arguments.repeats, tick), request)
     renderer.close()
-    record = {"scene": arguments.scene, "repeats": arguments.repeats, **bench_record(result, request)}
-    print(json.dumps(record, indent=2) if arguments.json else bench_text(record))
+    record = {"scene": arguments.scene, "repeats": arguments.repeats, **record}
+    text = effect_text if arguments.effect_costs else bench_text
+    print(json.dumps(record, indent=2) if arguments.json else text(record))
     return OK
+
+
+def effect_text(record: dict[str, Any]) -> str:
+    """What effects cost, for people: a line for each choice of effects."""
+    names = [
+        "as planned",
+        "every effect forced on",
+        *(f"without {cost['choice'][0][1:]}" for cost in record["costs"][2:]),
+    ]
+    lines = [f"{record['scene']:<26}processor time   over planned     lowest    highest         rays"]
+    for name, cost in zip(names, record["costs"], strict=True):
+        ratios = f"{cost['ratio']:15.3f}{cost['low']:11.3f}{cost['high']:11.3f}"
+        lines.append(f"{name:<26}{cost['ms']:11,.1f} ms{ratios}{cost['rays']:13,}")
+    return "\n".join(lines)
 
 
 def bench_record(result: Benchmark, request: FrameRequest) -> dict[str, Any]:

@@ -29,6 +29,7 @@ from clients.command_line.frame_flags import FLAG_OF_FIELD
 from clients.command_line.render import write_whole
 from clients.command_line.serve import flag_of, setting_texts, settings_of
 from renderer.codec import decode_texture
+from renderer.effect_choice import EFFECTS
 from service.settings import Settings
 from tests.clients.commands import PATIENCE_S, failing, start
 from tests.renderer.model_files import chunk, three_ds, three_ds_cube, three_ds_object
@@ -448,6 +449,21 @@ def test_bench_compares_a_frame_with_bare_embree(capsys: pytest.CaptureFixture[s
     assert main(["bench", "matte", *SMALL, "--repeats", "2"]) == 0
     text = capsys.readouterr().out
     assert all(re.search(rf"^{re.escape(name)} +[\d.]+ +[\d.]+ +[\d.]+", text, re.MULTILINE) for name in figures)
+
+
+def test_bench_tells_what_each_effect_costs(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["bench", "spheres", *SMALL, "--effect-costs", "--repeats", "2", "--json"]) == 0
+    costs = json.loads(capsys.readouterr().out)["costs"]
+    assert costs[0]["choice"] == []
+    assert (costs[0]["ratio"], costs[0]["low"], costs[0]["high"]) == (1.0, 1.0, 1.0)
+    assert len(costs[1]["choice"]) == len(EFFECTS)
+    assert costs[1]["rays"] > costs[0]["rays"]
+    without = {cost["choice"][0]: cost["rays"] for cost in costs[2:]}
+    assert set(without) == {"-textures", "-specular", "-shadows", "-reflection", "-refraction"}
+    assert max(without["-shadows"], without["-reflection"], without["-refraction"]) < costs[0]["rays"]
+    assert all(cost["ms"] >= 0 for cost in costs)
+    assert main(["bench", "matte", *SMALL, "--effect-costs", "--repeats", "1"]) == 0
+    assert capsys.readouterr().out.splitlines()[2].startswith("every effect forced on")
 
 
 def test_bench_needs_triangles(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
