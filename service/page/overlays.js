@@ -118,7 +118,7 @@ export class Overlays {
   #drawGaze({ x, y }, ratio) {
     const context = this.#marks;
     const [opening, arm] = [CROSS.opening * ratio, CROSS.arm * ratio];
-    for (const [stroke, width] of [["#000b", 4], ["#ff4a3d", 1.8]]) {
+    for (const [stroke, width] of [["#000b", 4], ["#ff4a3d", 2]]) {
       context.strokeStyle = stroke;
       context.lineWidth = width * ratio;
       context.beginPath();

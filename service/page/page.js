@@ -16,12 +16,13 @@ import { Targets } from "./targets.js";
 
 const SESSION_KEY = "gazetrace-stream";
 const CENTRE = { x: 0.5, y: 0.5 };
+const NARROW = "(max-width: 720px)"; // as in page.css
 
 const element = (id) => document.getElementById(id);
 const view = element("view");
 
 const notices = new Notices();
-const panel = new Panel();
+const panel = new Panel((name) => settings.toggleEffect(name));
 const token = new Token(askToken);
 const service = new Service(token);
 const screen = new ScreenSize();
@@ -65,6 +66,7 @@ const picker = new ScenePicker({
 let scene = null;
 let display = null; // of the configuration in force, complete
 let quality = null;
+let sources = 0; // of gaze, besides this page
 
 /** State to the service what this page wants to see. */
 function want() {
@@ -99,6 +101,7 @@ function followSource() {
   gaze.on = !settings.tracked;
   document.body.classList.toggle("tracked", settings.tracked);
   element("hold").disabled = settings.tracked;
+  notices.status(gazeTold("none"));
   if (settings.tracked) stream.lookAway();
   else gaze.lookAt(CENTRE);
 }
@@ -130,14 +133,22 @@ function refuse({ message, field }) {
 }
 
 function tellStatus({ viewers, gaze_sources, gaze_state }) {
+  sources = gaze_sources;
   element("viewers").textContent = viewers;
   element("sources").textContent = gaze_sources;
   element("gaze_state").textContent = gaze_state;
-  if (settings.tracked && gaze_state === "none") notices.status("Waiting for the tracker's gaze …");
+  const told = gazeTold(gaze_state);
+  if (told) notices.status(told);
+}
+
+/** What is worth saying of the gaze; empty: nothing. */
+function gazeTold(state) {
+  if (settings.tracked && sources === 0) return "Waiting for a tracker: give the session's name to its bridge.";
+  return state === "lost" ? "The gaze is lost: the whole screen is rendered evenly." : "";
 }
 
 function show({ header, picture }) {
-  notices.status(header.gaze_state === "lost" ? "The gaze is lost: the whole screen is rendered evenly." : "");
+  notices.status(gazeTold(header.gaze_state));
   stage.show(picture);
   panel.frame(header, header.gaze && gaze.seenAt(header.gaze));
   overlays.show({ gaze: header.gaze, display, query: cellQuery(header), pixelRatio: stage.ratio });
@@ -251,6 +262,7 @@ for (const [id, run] of Object.entries({
 })) element(id).addEventListener("click", run);
 addEventListener("hashchange", chooseScene);
 
+if (matchMedia(NARROW).matches) togglePanel();
 settings.distanceCm = screen.distanceCm;
 settings.offer(await service.qualitySchema());
 [scene] = await picker.load();

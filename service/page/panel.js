@@ -22,8 +22,11 @@ export class Panel {
   #config = null;
   #lastSeen = 0;
   #asked = null;
+  #onEffect;
 
-  constructor() {
+  /** @param onEffect receives the name of an effect that is to be simulated, or not any more */
+  constructor(onEffect) {
+    this.#onEffect = onEffect;
     setInterval(() => write("rate", this.#rate.rate(performance.now())), REFRESH_MS);
     for (const tab of element("tabs").children) tab.addEventListener("click", () => selectTab(tab));
     element("tabs").addEventListener("keydown", moveBetweenTabs);
@@ -44,20 +47,27 @@ export class Panel {
   /** What is in force: its effects, and the quality that was asked for. */
   configured({ effects }, quality) {
     this.#asked = quality;
-    const items = effects.map(({ name, reason }) => {
-      const item = document.createElement("li");
-      const strong = document.createElement("b");
-      strong.textContent = name.replaceAll("_", " ");
-      item.append(strong, ` ${reason}`);
-      item.title = reason;
-      return item;
-    });
+    const items = effects.map(({ name, reason }) => this.#effect(name, reason));
     if (!items.length) {
       items.push(document.createElement("li"));
       items[0].className = "none";
       items[0].textContent = "none: this scene calls for no effect";
     }
     element("effects").replaceChildren(...items);
+  }
+
+  #effect(name, reason) {
+    const item = document.createElement("li");
+    const button = document.createElement("button");
+    const called = name.replaceAll("_", " ");
+    button.textContent = called;
+    button.dataset.effect = name;
+    button.title = `simulate ${called}, or leave it out`;
+    button.setAttribute("aria-pressed", !this.#asked.effects.includes(`-${name}`));
+    button.addEventListener("click", () => this.#onEffect(name));
+    item.append(button, ` ${reason}`);
+    item.title = reason;
+    return item;
   }
 
   /**
@@ -85,7 +95,7 @@ export class Panel {
     write("latency_50", this.#latencies.percentile(0.5).toFixed(0));
     write("latency_95", this.#latencies.percentile(0.95).toFixed(0));
     const from = seenAt === null ? "gaze received" : "pointer moved";
-    write("latency_note", `${from} to frame drawn, last ${this.#latencies.count} gazes`);
+    write("latency_note", `${from} to frame drawn, last ${plural(this.#latencies.count, "gaze")}`);
   }
 
   #plotError({ config, phase, error, service_time_ns }) {
@@ -122,7 +132,8 @@ function tellCost(header, asked) {
   write("dropped", count(header.dropped));
   write("rms", accuracy(error.rms));
   write("foveal_rms", accuracy(error.foveal_rms));
-  write("total", `${timing_ms.total.toFixed(1)} ms`);
+  write("total", `${timing_ms.total.toFixed(1)} ms${header.deadline_met === false ? ", past its deadline" : ""}`);
+  element("total").classList.toggle("late", header.deadline_met === false);
   for (const stage of STAGES) {
     write(stage, `${timing_ms[stage].toFixed(1)} ms`);
     document.querySelector(`#stages .${stage}`).style.flexGrow = timing_ms[stage];
@@ -160,6 +171,10 @@ function write(id, text) {
 
 function count(number) {
   return number.toLocaleString("en");
+}
+
+function plural(number, noun) {
+  return `${number} ${noun}${number === 1 ? "" : "s"}`;
 }
 
 function percent(share) {

@@ -12,7 +12,7 @@ const SAMPLES = [1, 2, 4, 8, 16, 32, 64, 128, 256];
 const DEADLINES_MS = [16, 33, 50, 70, 100, 200, 500];
 const DEFAULTS = {
   samples_per_cell: "16", deadline_ms: "", antialiasing: "stochastic", map: "aligned", reconstruction: "nearest",
-  model: "peli", scale: "0", margin_deg: "0", max_depth: "5", format: "jpeg", image_quality: "90",
+  model: "peli", scale: "0", margin_deg: "0", shadow_samples: "4", max_depth: "5", format: "jpeg", image_quality: "90",
 };
 /** Fields of a request, by the control that sets them, where the names differ. */
 const CONTROL_OF = {
@@ -24,6 +24,7 @@ const CONTROL_OF = {
 export class Settings {
   #form;
   #onChange;
+  #effectsOff = new Set();
 
   /**
    * @param form     the form #settings
@@ -49,7 +50,8 @@ export class Settings {
     const samples = SAMPLES.filter((count) => count <= most).map((count) => new Option(count, count));
     this.#field("samples_per_cell").replaceChildren(...samples);
     const deadlines = DEADLINES_MS.map((time) => new Option(`${time} ms`, time));
-    this.#field("deadline_ms").replaceChildren(new Option("none", ""), ...deadlines);
+    this.#field("deadline_ms").replaceChildren(new Option("default", ""), ...deadlines);
+    this.#field("shadow_samples").max = quality.shadow_samples.maximum;
     this.#field("max_depth").max = quality.max_depth.maximum;
     this.#field("margin_deg").max = acuity.margin_deg.maximum;
     this.#take({ ...DEFAULTS, ...kept() });
@@ -57,17 +59,25 @@ export class Settings {
 
   /** `quality` of a render request. */
   get quality() {
-    const { samples_per_cell, deadline_ms, antialiasing, map, reconstruction, model, margin_deg, max_depth } =
-      this.#values();
+    const { samples_per_cell, deadline_ms, antialiasing, map, reconstruction, model, margin_deg, shadow_samples,
+      max_depth } = this.#values();
     return {
       map,
       samples_per_cell: Number(samples_per_cell),
       antialiasing,
+      shadow_samples: Number(shadow_samples),
       max_depth: Number(max_depth),
+      effects: [...this.#effectsOff].map((name) => `-${name}`),
       acuity: { model, scale: this.#scale(), margin_deg: Number(margin_deg) },
       reconstruction,
       ...(deadline_ms && { deadline_ms: Number(deadline_ms) }),
     };
+  }
+
+  /** Simulate an effect that a scene calls for, or not. */
+  toggleEffect(name) {
+    if (!this.#effectsOff.delete(name)) this.#effectsOff.add(name);
+    this.#onChange("effects");
   }
 
   /** `format` and `image_quality` of a render request. */
@@ -140,6 +150,7 @@ export class Settings {
 
   #reset() {
     localStorage.removeItem(KEY);
+    this.#effectsOff.clear();
     this.#take(DEFAULTS);
     this.#onChange("defaults");
   }

@@ -97,6 +97,10 @@ def test_the_panel_tells_what_the_frame_cost_and_why(page: Page, address: str) -
     reasons = {effect["name"]: effect["reason"] for effect in page.heard("ready")[-1]["effects"]}
     shown = page.evaluate("[...document.querySelectorAll('#effects li')].map((effect) => effect.textContent)")
     assert shown == [f"{name.replace('_', ' ')} {reason}" for name, reason in reasons.items()]
+    page.click("[data-effect=reflection]")
+    without = page.shown(lambda header: header.config != final.config and header.phase == "final")
+    assert without.cost["rays"]["reflection"] == 0 < final.cost["rays"]["reflection"]
+    assert page.evaluate("document.querySelector('[data-effect=reflection]').ariaPressed") == "false"
     dots = """(() => {
       const plot = document.getElementById('plot');
       const context = new OffscreenCanvas(plot.width, plot.height).getContext('2d');
@@ -126,6 +130,9 @@ def test_quality_is_asked_for_as_set_and_kept(page: Page, address: str) -> None:
     asked = page.shown(lambda header: header.config == page.said("configure")[-1]["id"]) and page.said("configure")[-1]
     assert asked["quality"]["acuity"] == {"model": "guenter", "scale": 4, "margin_deg": 0}
     assert asked["quality"]["samples_per_cell"] == 2
+    page.enter("[name=deadline_ms]", "100")
+    page.shown(lambda header: header.config == page.said("quality")[-1]["id"])
+    assert page.said("quality")[-1]["quality"]["deadline_ms"] == 100
     page.click("#defaults")
     page.shown(lambda header: header.cost["map"]["kind"] == "aligned")
 
