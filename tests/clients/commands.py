@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import re
 import subprocess
 import sys
@@ -9,9 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from clients.command_line import main
+from clients.command_line import build_parser, main
 
 ROOT = Path(__file__).parents[2]
+SMALL = ("--size", "96x54")
 PATIENCE_S = 120
 """How long a process may take to say something: the first one compiles the kernels."""
 
@@ -28,3 +30,10 @@ def failing(capsys: pytest.CaptureFixture[str], *words: str, status: int = 2) ->
     assert said.out == ""
     assert re.fullmatch(r"gazetrace: [^\n]+\n", said.err), said.err
     return said.err
+
+
+def help_of(command: str) -> str:
+    """What `gazetrace COMMAND --help` prints."""
+    parser = build_parser()
+    (commands,) = (action for action in parser._actions if isinstance(action, argparse._SubParsersAction))
+    return str(commands.choices[command].format_help())
