@@ -93,6 +93,7 @@ class Listener:
         self.heard = News()
         self.closes: list[int] = []
         self.port = 0
+        self.display: dict[str, float] | None = DISPLAY
         self._stack = ExitStack()
         self._connections: list[ServerConnection] = []
 
@@ -118,7 +119,7 @@ class Listener:
 
     def _talk(self, connection: ServerConnection) -> None:
         self._connections.append(connection)
-        ready = protocol.Ready("main", 1, "matte", DISPLAY, None, (), 0)
+        ready = protocol.Ready("main", 1, "matte", self.display, None, (), 0)
         connection.send(protocol.encode(ready))
         self.heard.add(("path", connection.request.path if connection.request else ""))
         try:

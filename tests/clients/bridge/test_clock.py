@@ -38,6 +38,13 @@ def test_jitter_goes_and_the_least_delay_stays() -> None:
     assert np.ptp(errors[250:]) < MILLISECOND_NS
 
 
+def test_the_least_delay_counts_from_the_moment_it_is_seen() -> None:
+    clock = DeviceClock((MILLISECOND_NS,))
+    for i, delay in enumerate([MILLISECOND_NS] * 5 + [200_000, MILLISECOND_NS]):
+        mapped = clock.map(float(i * 4), START + i * STEP_NS + delay)
+    assert mapped.captured_ns == START + 6 * STEP_NS + 200_000
+
+
 @pytest.mark.parametrize("ppm", [-100, 50, 300])
 def test_drift_is_followed(ppm: float) -> None:
     clock = DeviceClock((MICROSECOND_NS,))

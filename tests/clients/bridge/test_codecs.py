@@ -176,6 +176,12 @@ def test_asl_reads_ten_bytes_with_the_frame_number(record: tuple[int, ...], stre
     assert sample.size == 12
 
 
+def test_asl_refuses_bits_that_no_record_sets() -> None:
+    codec = Asl()
+    assert codec.feed(bytes.fromhex("80002d00000200207802")) == []
+    assert codec.bad == 1
+
+
 def test_asl_finds_the_next_record_after_each_lost_byte() -> None:
     stream = b"".join(bytes.fromhex(streamed) for _, _, streamed in ASL_8)
     for lost in range(len(stream)):

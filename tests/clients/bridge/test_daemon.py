@@ -248,6 +248,17 @@ def test_calibration_walks_the_viewers_through_nine_points(
         service.heard.until(lambda items: sum(isinstance(item, protocol.Margin) for item in items) >= 2)
 
 
+def test_the_margin_is_told_before_anybody_has_configured_the_session(
+    terminal: Terminal, service: Listener, tmp_path: Path
+) -> None:
+    file = tmp_path / "lab.json"
+    file.write_text('{"model": "affine", "points": [[0, 0, 0, 0], [9, 0, 1, 0], [0, 9, 0, 1], [9, 9, 1, 1.1]]}')
+    service.display = None
+    with running(config(terminal, service, calibration=file)):
+        (margin,) = service.heard.until(lambda items: [i for i in items if isinstance(i, protocol.Margin)])
+    assert margin.margin_deg > 0.1
+
+
 def test_camera_units_are_not_sent_without_a_calibration(terminal: Terminal, service: Listener) -> None:
     with pytest.raises(ConfigError, match="--calibrate makes one"):
         running(config(terminal, service, protocol="iscan")).__enter__()
