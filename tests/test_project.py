@@ -51,7 +51,8 @@ def test_constraints_pin_every_requirement_and_name_no_host() -> None:
     assert all(re.fullmatch(r"[A-Za-z0-9_.-]+==[A-Za-z0-9.]+", pin) for pin in pins), pins
     pinned = {_plain(pin.partition("==")[0]) for pin in pins}
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    asked = [*project["dependencies"], *project["optional-dependencies"]["test"]]
+    extras = project["optional-dependencies"]
+    asked = [*project["dependencies"], *extras["test"], *extras["peers"]]
     names = {_plain(match[0]) for text in asked if (match := re.match(r"[\w.-]+", text))}
     assert names <= pinned
 

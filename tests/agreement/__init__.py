@@ -1,0 +1,1 @@
+"""The renderer against renderers that others wrote: POV-Ray and Mitsuba."""
