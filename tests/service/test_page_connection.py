@@ -93,7 +93,7 @@ def test_an_eye_tracker_takes_the_pointers_place_and_calibrates(page: Page, addr
     session = page.evaluate("document.getElementById('session').value")
     assert "Waiting for a tracker" in page.evaluate("document.getElementById('status').textContent")
     with source(address, session) as tracker:
-        page.point_at(50, 50)
+        page.point_at(60, 300)
         tracker.say(Gaze(300, 200, seq=1))
         header = page.shown(is_final_at(300, 200))
         assert header.gaze is not None
