@@ -21,6 +21,7 @@ export class Overlays {
   #marks;
   #drawn;
   #cells;
+  #onError;
   #on;
   #shown = null;
   #drawnFor = null;
@@ -30,12 +31,14 @@ export class Overlays {
    * @param marks canvas over the frame for lines
    * @param drawn canvas over the frame for drawings of the service, blended
    * @param cells asks the service for one: (query) => Promise of an ImageBitmap
+   * @param onError receives the error where the service refuses
    * @param on    {gaze, region, cells, rays}
    */
-  constructor({ marks, drawn, cells, on }) {
+  constructor({ marks, drawn, cells, onError, on }) {
     this.#marks = marks.getContext("2d");
     this.#drawn = drawn;
     this.#cells = cells;
+    this.#onError = onError;
     this.#on = { ...on };
   }
 
@@ -91,10 +94,11 @@ export class Overlays {
       this.#drawn.height = picture.height;
       this.#drawn.getContext("2d").drawImage(picture, 0, 0);
       picture.close();
-      this.#drawnFor = wanted;
-    } finally {
-      this.#busy = false;
+    } catch (error) {
+      this.#onError(error);
     }
+    this.#drawnFor = wanted;
+    this.#busy = false;
     this.#draw();
   }
 

@@ -53,6 +53,7 @@ const overlays = new Overlays({
   marks: element("marks"),
   drawn: element("drawn"),
   cells: (query) => service.cells(query),
+  onError: refuse,
   on: { gaze: true },
 });
 const fitting = new CardFitting({ dialog: element("fitting"), screen, onKept: changed });
@@ -164,7 +165,7 @@ function cellQuery(header) {
     samples_per_cell: Math.max(1, Math.round(header.samples)),
     acuity_model: quality.acuity.model,
     acuity_scale: header.acuity_scale,
-    margin_deg: quality.acuity.margin_deg,
+    margin_deg: header.map.margin_deg,
   };
 }
 

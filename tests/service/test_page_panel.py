@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import httpx
 import pytest
 
 from tests.service.chromium import Page
@@ -77,6 +78,13 @@ def test_overlays_are_drawn_over_the_frame_they_belong_to(page: Page, address: s
         assert page.evaluate(f"document.querySelector('[data-overlay={other}]').ariaPressed") == "false"
         assert side in page.evaluate("document.getElementById('legend').innerText").split()
         assert not page.evaluate("document.getElementById('drawn').hidden")
+    (asked,) = {
+        event["params"]["request"]["url"]
+        for event in page.events
+        if event["method"] == "Network.requestWillBeSent" and "drawing=cells" in event["params"]["request"]["url"]
+    }
+    counts = httpx.get(asked.replace("format=png", "format=json")).json()
+    assert counts["cells"] == page.shown().cost["map"]["cells"], "the frame's own cells"
     page.click("[data-overlay=rays]")
     assert page.evaluate("document.getElementById('drawn').hidden && document.getElementById('legend').hidden")
     assert page.complaints() == []
