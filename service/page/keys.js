@@ -34,7 +34,7 @@ export class Keys {
     if (pressed === " " && event.target.matches("button, a, input")) return;
     const found = this.#keys.find(({ keys }) => keys.includes(pressed));
     if (!found) return;
-    event.preventDefault();
+    if (pressed !== "Escape") event.preventDefault(); // which also closes a popover
     found.run(pressed);
   }
 }

@@ -190,6 +190,7 @@ def test_keys_are_listed_and_closed_again(page: Page, address: str) -> None:
     assert "triangles" in told
     assert "no effects" in told
     page.press("Escape")
+    assert not page.evaluate("document.getElementById('scenes').matches(':popover-open')")
     page.press("p")
     assert not page.evaluate("document.getElementById('panel').checkVisibility()")
 
