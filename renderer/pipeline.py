@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 
+from renderer.allocator import keep_freed_memory
 from renderer.cellmap import CellMap
 from renderer.deadline import NS_PER_MS, affordable_samples, fitted
 from renderer.display import Display
@@ -41,6 +42,7 @@ class Renderer:
         map_cache_bytes: int = DEFAULT_MAP_CACHE_BYTES,
         store_bytes: int = DEFAULT_STORE_BYTES,
     ) -> None:
+        keep_freed_memory()
         self._memory = Memory(map_cache_bytes, store_bytes)
         self.map_cache = self._memory.maps
         self.store_cache = self._memory.stores
