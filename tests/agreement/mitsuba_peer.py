@@ -9,7 +9,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.display import Display
-from renderer.scene import BLACK, Light, Material, Mesh, PointLight, Rgb, Scene, Sphere, SphereLight, Surroundings
+from renderer.scene import (
+    Light,
+    Material,
+    Mesh,
+    PointLight,
+    Rgb,
+    Scene,
+    Sphere,
+    SphereLight,
+    Surroundings,
+    Texture,
+)
+from tests.renderer.drawing import BLACK, WHITE
 
 VARIANT = "scalar_rgb"
 
@@ -106,8 +118,11 @@ def _followed(mi: Any, scene: Any, lights: Any, around: Surroundings, ray: Any, 
     if mi.has_flag(material.flags(), mi.BSDFFlags.Smooth):
         for light in lights:
             way, arriving = light.sample_direction(hit, middle)
-            if way.pdf > 0.0 and not scene.ray_test(hit.spawn_ray_to(way.p)):
-                seen += np.array(material.eval(mi.BSDFContext(), hit, hit.to_local(way.d)) * arriving)
+            if way.pdf > 0.0:
+                sent = np.array(material.eval(mi.BSDFContext(), hit, hit.to_local(way.d)) * arriving)
+                seen += sent * _let_through(scene, hit.spawn_ray_to(way.p))
+    if (passing := _through(hit, ray)) > 0.0:
+        seen += passing * _followed(mi, scene, lights, around, hit.spawn_ray(ray.d), depth)
     for part in range(material.component_count() if depth > 0 else 0):
         if mi.has_flag(material.flags(part), mi.BSDFFlags.Delta):
             # Carried as importance is, light knows no n^2 where it is refracted: Whitted's model has none.
@@ -117,6 +132,25 @@ def _followed(mi: Any, scene: Any, lights: Any, around: Surroundings, ray: Any, 
                 onwards = hit.spawn_ray(hit.to_world(turned.wo))
                 seen += np.array(share) * _followed(mi, scene, lights, around, onwards, depth - 1)
     return seen
+
+
+def _through(hit: Any, ray: Any) -> float:
+    """Share of the light that passes the holes of what was hit."""
+    return float(hit.bsdf(ray).eval_null_transmission(hit)[0])
+
+
+def _let_through(scene: Any, ray: Any) -> float:
+    """Share of the light that passes all there is along a ray that ends at a light."""
+    share = 1.0
+    while share > 0.0:
+        hit = scene.ray_intersect(ray)
+        if not hit.is_valid():
+            break
+        share *= _through(hit, ray)
+        onwards = hit.spawn_ray(ray.d)
+        onwards.maxt = ray.maxt - hit.t
+        ray = onwards
+    return share
 
 
 def _light(light: Light) -> dict[str, Any]:
@@ -138,9 +172,12 @@ def _mesh(mesh: Mesh) -> Any:
     if any(mesh.material.emission):
         looks["emitter"] = mi.load_dict({"type": "area", "radiance": _rgb(mesh.material.emission)})
     assert mesh.normals is None
-    made = mi.Mesh(mesh.name, len(mesh.vertices), len(mesh.faces), looks)
+    mapped = mesh.uvs is not None
+    made = mi.Mesh(mesh.name, len(mesh.vertices), len(mesh.faces), looks, has_vertex_texcoords=mapped)
     parameters = mi.traverse(made)
     parameters["vertex_positions"] = mesh.vertices.astype(np.float32).ravel()
+    if mesh.uvs is not None:
+        parameters["vertex_texcoords"] = (mesh.uvs * (1, -1) + (0, 1)).astype(np.float32).ravel()  # v runs down there
     parameters["faces"] = mesh.faces.astype(np.uint32).ravel()
     parameters.update()
     return made
@@ -161,6 +198,14 @@ def _material(material: Material) -> dict[str, Any]:
             "type": "dielectric", "int_ior": material.ior, "ext_ior": 1.0,
             "specular_transmittance": _rgb(material.transmission),
         }  # fmt: skip
+    if material.diffuse_texture is not None:
+        assert material.diffuse == WHITE
+        colours = _bitmap(material.diffuse_texture.pixels, material.diffuse_texture, raw=False, filter_type="bilinear")
+        return _two_sided({"type": "diffuse", "reflectance": colours})
+    if material.alpha_texture is not None:
+        assert material.alpha_texture.alpha is not None
+        stripes = _bitmap(material.alpha_texture.alpha, material.alpha_texture, raw=True, filter_type="nearest")
+        return {"type": "mask", "opacity": stripes, "bsdf": _two_sided(_diffuse(material.diffuse))}
     matt, mirror = _diffuse(material.diffuse), _mirror(material.reflection)
     if not any(material.reflection):
         return _two_sided(matt)
@@ -168,6 +213,14 @@ def _material(material: Material) -> dict[str, Any]:
         return _two_sided(mirror)
     double = [_diffuse(_twice(material.diffuse)), _mirror(_twice(material.reflection))]
     return _two_sided({"type": "blendbsdf", "weight": 0.5, "matt": double[0], "mirror": double[1]})
+
+
+def _bitmap(pixels: NDArray[np.uint8], texture: Texture, raw: bool, filter_type: str) -> dict[str, Any]:
+    assert texture.wrap_u == texture.wrap_v
+    return {
+        "type": "bitmap", "bitmap": mitsuba().Bitmap(pixels), "raw": raw, "filter_type": filter_type,
+        "wrap_mode": texture.wrap_u,
+    }  # fmt: skip
 
 
 def _diffuse(colour: Rgb) -> dict[str, Any]:

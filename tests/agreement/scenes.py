@@ -2,8 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
+
 from renderer.camera import Camera
-from renderer.scene import Material, Mesh, PointLight, RectangleLight, Rgb, Scene, Sphere, SphereLight, Surroundings
+from renderer.scene import (
+    Material,
+    Mesh,
+    PointLight,
+    RectangleLight,
+    Rgb,
+    Scene,
+    Sphere,
+    SphereLight,
+    Surroundings,
+    Texture,
+)
 from tests.renderer.drawing import BLACK, FINE, WHITE, box, floor, icosphere, quad
 
 SKY = Surroundings(zenith=(0.25, 0.35, 0.6), horizon=(0.6, 0.55, 0.5))
@@ -117,6 +132,37 @@ def matt_scene() -> Scene:
         camera=VIEW,
         exposure=FINE,
     )
+
+
+def textured_scene() -> Scene:
+    """Pictures magnified on a floor and two walls, repeated, clamped and mirrored, and a fence of cut-out stripes
+    that casts the shadow of its bars.
+    """
+    colours = np.random.default_rng(1).integers(0, 256, (12, 16, 3), dtype=np.uint8)
+    bars = np.broadcast_to(np.where(np.arange(16) % 4 < 2, 255, 0).astype(np.uint8), (4, 16)).copy()
+    ground = Material("ground", WHITE, diffuse_texture=Texture(colours))
+    left, right = (
+        Material(wrap, WHITE, diffuse_texture=Texture(colours[:5, :7], wrap, wrap, wrap))
+        for wrap in ("clamp", "mirror")
+    )
+    fence = Material("fence", (0.6, 0.2, 0.1), alpha_texture=Texture(colours[:4], alpha=bars))
+    return Scene(
+        meshes=(
+            floor(ground, y=-0.2),
+            _stretched(quad((-3.0, -0.1, -2.0), (3.0, 0.0, 0.0), (0.0, 2.5, 0.0), left), 2.5, -0.7),
+            _stretched(quad((0.2, -0.1, -2.0), (3.0, 0.0, 0.0), (0.0, 2.5, 0.0), right), 2.5, -0.7),
+            quad((-1.5, -0.1, 0.8), (3.0, 0.0, -0.5), (0.0, 1.2, 0.0), fence),
+        ),
+        lights=(LEFT, RIGHT),
+        camera=VIEW,
+        exposure=FINE,
+    )
+
+
+def _stretched(mesh: Mesh, factor: float, shift: float) -> Mesh:
+    """With texture coordinates that leave 0 to 1."""
+    assert mesh.uvs is not None
+    return replace(mesh, uvs=mesh.uvs * factor + shift)
 
 
 def glowing_glass_scene() -> Scene:

@@ -28,7 +28,15 @@ from renderer.quality import Quality
 from renderer.scene import Scene
 from tests.agreement.comparison import assert_consistent, assert_equal_light, require
 from tests.agreement.mitsuba_peer import followed_picture, has_mitsuba, mitsuba_scene, repeated_pictures
-from tests.agreement.scenes import bubble, glass_scene, glowing_glass_scene, lamp_scene, matt_scene, mirror_scene
+from tests.agreement.scenes import (
+    bubble,
+    glass_scene,
+    glowing_glass_scene,
+    lamp_scene,
+    matt_scene,
+    mirror_scene,
+    textured_scene,
+)
 from tests.renderer.drawing import shoot
 
 SCREEN = Display(96, 64)
@@ -93,6 +101,14 @@ def test_glass_before_matt_things(renderer: Renderer, tmp_path: Path) -> None:
     assert_equal_light(ours, theirs, 1e-4, 0.96, tmp_path)
     assert_equal_light(ours, theirs, 1e-3, 0.995, tmp_path)
     assert_equal_light(ours, theirs, 1e-2, 0.999, tmp_path)
+
+
+def test_textures_and_cut_outs(renderer: Renderer, tmp_path: Path) -> None:
+    """Magnified pictures, interpolated in linear light, on and beyond their edges; the shadow of a fence.
+    What is seen through its gaps is shifted by where their rays start again.
+    """
+    ours, theirs = followed(renderer, textured_scene(), 0)
+    assert_equal_light(ours, theirs, 1e-4, 0.9995, tmp_path)
 
 
 def test_averages_of_matt_things(renderer: Renderer, tmp_path: Path) -> None:
