@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.kernel import kernel
+from renderer.kernel import formula, kernel
 from renderer.scene import WRAPS, Texture
 from renderer.texture import srgb_to_linear
 from renderer.tonemap import FIRST_CODES, THRESHOLDS, srgb_code
@@ -27,31 +27,60 @@ PICTURE = np.dtype(
 are, the number of texels of the largest, and rows of WRAPS."""
 
 
+CODE_STEPS = 127.5
+"""Codes of a normal map from 0 to the largest component."""
+
+
+class Reading(NamedTuple):
+    """A texture, and what its codes stand for.
+
+    Attributes:
+        texture: the picture.
+        normals: components of normals in place of colours.
+    """
+
+    texture: Texture
+    normals: bool = False
+
+
 class TextureAtlas(NamedTuple):
     """Pictures one after another, each followed by its smaller levels, down to one texel.
 
     Attributes:
-        texels: (n,) uint32 sRGB codes, red | green << 8 | blue << 16 | opacity << 24, row by row, row 0 of each
+        texels: (n,) uint32 codes, red | green << 8 | blue << 16 | opacity << 24, row by row, row 0 of each
             picture at the top; smaller levels have no opacity.
         pictures: (k,) PICTURE, the levels of each picture in a row, the largest first.
-        linear: (256,) float64 linear light of each code (IEC 61966-2-1).
+        linear: (256,) float64 linear light of each sRGB code (IEC 61966-2-1).
+        signed: (256,) float64 component of a normal, -1 to 1, of each code of a normal map.
     """
 
     texels: NDArray[np.uint32]
     pictures: NDArray[np.void]
     linear: NDArray[np.float64]
+    signed: NDArray[np.float64]
 
 
-def build_atlas(textures: list[Texture]) -> tuple[TextureAtlas, dict[Texture, int]]:
-    """Lay `textures` one after another with their smaller levels; also the row of each one's largest level."""
-    linear = srgb_to_linear(np.arange(256) / 255)
+def normal_components() -> NDArray[np.float64]:
+    """(256,) float64 what each code of a normal map stands for: 2c - 1, but 0 for both codes around the middle.
+
+    No code is exactly the middle, and files take either for a flat place.
+    """
+    signed = np.arange(256) / CODE_STEPS - 1.0
+    signed[127:129] = 0.0
+    return signed
+
+
+def build_atlas(readings: list[Reading]) -> tuple[TextureAtlas, dict[Reading, int]]:
+    """Lay textures one after another with their smaller levels; also the row of each one's largest level."""
+    linear, signed = srgb_to_linear(np.arange(256) / 255), normal_components()
     texels: list[NDArray[np.uint32]] = []
     rows: list[tuple[int, int, int, int, float, int, int]] = []
     row_of = {}
     start = 0
-    for texture in textures:
-        row_of[texture] = len(rows)
-        levels = _levels(texture, linear)
+    for reading in readings:
+        row_of[reading] = len(rows)
+        texture = reading.texture
+        levels = _levels(texture, signed if reading.normals else linear, reading.normals)
         wraps = WRAPS.index(texture.wrap_u), WRAPS.index(texture.wrap_v)
         for level in levels:
             height, width = level.shape
@@ -59,33 +88,43 @@ def build_atlas(textures: list[Texture]) -> tuple[TextureAtlas, dict[Texture, in
             texels.append(level.ravel())
             start += level.size
     pictures = np.array(rows, dtype=PICTURE) if rows else np.zeros(0, dtype=PICTURE)
-    return TextureAtlas(np.concatenate([*texels, np.zeros(1, np.uint32)]), pictures, linear), row_of
+    return TextureAtlas(np.concatenate([*texels, np.zeros(1, np.uint32)]), pictures, linear, signed), row_of
 
 
-def _levels(texture: Texture, linear: NDArray[np.float64]) -> list[NDArray[np.uint32]]:
-    """(h, w) uint32 codes of a texture, and of each half of it down to one texel."""
+def _levels(texture: Texture, decoded: NDArray[np.float64], normals: bool) -> list[NDArray[np.uint32]]:
+    """(h, w) uint32 codes of a texture, and of each half of it down to one texel; arguments as of `shrink`."""
     colours = texture.pixels.astype(np.uint32) @ np.array([1, 1 << 8, 1 << 16], dtype=np.uint32)
     levels = [colours | (texture.opacity.astype(np.uint32) << np.uint32(24))]
     while levels[-1].size > 1:
         height, width = levels[-1].shape
         levels.append(np.zeros((max(1, height // 2), max(1, width // 2)), dtype=np.uint32))
-        shrink(levels[-2], linear, THRESHOLDS, FIRST_CODES, levels[-1])
+        shrink(levels[-2], decoded, normals, THRESHOLDS, FIRST_CODES, levels[-1])
     return levels
+
+
+@formula
+def _code(value: float, normals: bool, thresholds: NDArray[np.float32], first_codes: NDArray[np.uint8]) -> int:
+    """The code of a mean."""
+    if normals:
+        return int(CODE_STEPS * value + CODE_STEPS + 0.5)
+    return int(srgb_code(np.float32(value), thresholds, first_codes))
 
 
 @kernel
 def shrink(
     texels: NDArray[np.uint32],
-    linear: NDArray[np.float64],
+    decoded: NDArray[np.float64],
+    normals: bool,
     thresholds: NDArray[np.float32],
     first_codes: NDArray[np.uint8],
     smaller: NDArray[np.uint32],
 ) -> None:
-    """Fill a picture with the mean linear light of a larger one over each of its texels.
+    """Fill a picture with the mean linear light, or the mean normal, of a larger one over each of its texels.
 
     Args:
         texels: (h, w) uint32 codes of the larger one.
-        linear: (256,) float64 linear light of each code.
+        decoded: (256,) float64 linear light, or component of a normal, of each code.
+        normals: whether it holds normals.
         thresholds, first_codes: of `tonemap`.
         smaller: (h2, w2) uint32, written; its texels need not hold whole texels of the larger one.
     """
@@ -102,11 +141,11 @@ def shrink(
                 for x in range(int(left), int(np.ceil(right))):
                     share = down * (min(right, x + 1.0) - max(left, float(x)))
                     code = texels[y, x]
-                    red += share * linear[code & 255]
-                    green += share * linear[(code >> 8) & 255]
-                    blue += share * linear[(code >> 16) & 255]
+                    red += share * decoded[code & 255]
+                    green += share * decoded[(code >> 8) & 255]
+                    blue += share * decoded[(code >> 16) & 255]
             area = (bottom - top) * (right - left)
-            r = srgb_code(np.float32(red / area), thresholds, first_codes)
-            g = srgb_code(np.float32(green / area), thresholds, first_codes)
-            b = srgb_code(np.float32(blue / area), thresholds, first_codes)
+            r = _code(red / area, normals, thresholds, first_codes)
+            g = _code(green / area, normals, thresholds, first_codes)
+            b = _code(blue / area, normals, thresholds, first_codes)
             smaller[row, column] = np.uint32(r | (g << 8) | (b << 16))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from renderer.errors import SettingsError
 
-EFFECTS = ("cutouts", "textures", "specular", "shadows", "soft_shadows", "reflection", "refraction")
+EFFECTS = ("cutouts", "textures", "normal_maps", "specular", "shadows", "soft_shadows", "reflection", "refraction")
 """All there are: `shadows` are the hard ones of point lights, `soft_shadows` those of lights with a size."""
 
 EffectChoice = tuple[str, ...]

@@ -60,6 +60,7 @@ def plan_effects(scene: Scene) -> EffectPlan:
     calls: dict[str, Callable[[Material], bool]] = {
         "cutouts": has_holes,
         "textures": lambda material: bool(textures_of(material)),
+        "normal_maps": lambda material: _shows_its_normal(material, bool(lights), scene) and has_bumps(material),
         "specular": lambda material: has_highlight(material) and bool(lights),
         "shadows": lambda material: _takes_light(material) and bool(casting["shadows"]) and casters > 0,
         "soft_shadows": lambda material: _takes_light(material) and bool(casting["soft_shadows"]) and casters > 0,
@@ -94,6 +95,15 @@ def has_holes(material: Material) -> bool:
     return texture is not None and int(texture.opacity.min()) < 255 * material.alpha_cutoff
 
 
+def has_bumps(material: Material) -> bool:
+    """Whether its normal map bends a normal somewhere."""
+    texture = material.normal_texture
+    if texture is None or material.normal_scale == 0.0:
+        return False
+    across = texture.pixels[:, :, :2]
+    return bool(((across != 127) & (across != 128)).any())
+
+
 def textures_of(material: Material) -> list[Texture]:
     """The textures of a material that change its colour; one that multiplies black does not."""
     shown = []
@@ -105,7 +115,7 @@ def textures_of(material: Material) -> list[Texture]:
 
 
 def pictures_of(material: Material) -> list[Texture]:
-    """All textures of a material that are looked up."""
+    """All textures of a material that are looked up, but for its normal map."""
     holes = material.alpha_texture
     return [*textures_of(material), *([holes] if holes is not None and has_holes(material) else [])]
 
@@ -140,6 +150,12 @@ def has_highlight(material: Material) -> bool:
 
 def _takes_light(material: Material) -> bool:
     return material.diffuse != BLACK or has_highlight(material)
+
+
+def _shows_its_normal(material: Material, lit: bool, scene: Scene) -> bool:
+    """Whether where a surface faces changes its looks: under lights, or as a mirror or a boundary."""
+    turned = material.base == "ashikhmin-shirley" and scene.surroundings.ambient != BLACK
+    return (lit and _takes_light(material)) or turned or material.reflection != BLACK or is_boundary(material)
 
 
 def is_boundary(material: Material) -> bool:

@@ -12,6 +12,7 @@ class Finish(NamedTuple):
         kr, kg, kb: diffuse albedo.
         sr, sg, sb: specular: height of Phong's highlight, or Rs of Ashikhmin and Shirley.
         ux, uy, uz: unit tangent along the grain; any vector where the material has none.
+        hx, hy, hz: unit shading normal as it is without the normal map.
     """
 
     kr: float
@@ -23,3 +24,6 @@ class Finish(NamedTuple):
     ux: float
     uy: float
     uz: float
+    hx: float
+    hy: float
+    hz: float

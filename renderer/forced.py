@@ -11,22 +11,27 @@ import itertools
 
 import numpy as np
 
-from renderer.atlas import build_atlas
+from renderer.atlas import Reading, build_atlas
 from renderer.effect_choice import EffectChoice
-from renderer.effects import forced_plan, pictures_of
+from renderer.effects import forced_plan
 from renderer.intersection import Intersector
-from renderer.prepared import PreparedScene, Sieve, calls_of, prepare, used_materials
+from renderer.material_table import calls_of, readings_of, used_materials
+from renderer.prepared import PreparedScene, Sieve, prepare
 from renderer.scene import Texture
 
 MOST_VARIANTS = 8
 """Variants of a scene that are kept; they are cheap to make."""
 
-PICTURES = ("picture", "specular_picture")
-HOLES = ("alpha_picture",)
-"""Fields of the material table that name a texture, for colours and for holes."""
+WHITE = Reading(Texture(np.full((1, 1, 3), 255, dtype=np.uint8), "white"))
+FLAT = Reading(Texture(np.array([[[128, 128, 255]]], dtype=np.uint8), "flat"), normals=True)
+"""What surfaces without a texture, or without a normal map, look up where these are forced on."""
 
-WHITE = Texture(np.full((1, 1, 3), 255, dtype=np.uint8), "white")
-"""What surfaces without a texture look up where textures are forced on."""
+LOOKED_UP = {
+    "textures": (("picture", "specular_picture"), WHITE),
+    "cutouts": (("alpha_picture",), WHITE),
+    "normal_maps": (("normal_picture",), FLAT),
+}
+"""Fields of the material table that name a texture, by effect, and what stands in for one."""
 
 
 def with_effects(prepared: PreparedScene, choice: EffectChoice) -> PreparedScene:
@@ -47,16 +52,16 @@ def _forced(prepared: PreparedScene, choice: EffectChoice) -> PreparedScene:
     materials = surfaces.materials.copy()
     materials["calls"] = [calls_of(material, plan) for material in used_materials(prepared.scene)]
     textures = surfaces.textures
-    if "textures" not in plan.names:
-        for name in PICTURES:
-            materials[name] = -1
-    if "cutouts" not in plan.names:
-        materials["alpha_picture"] = -1
-    if plan.forced & {"textures", "cutouts"}:
-        shown = itertools.chain(*(pictures_of(material) for material in used_materials(prepared.scene)))
-        textures, picture = build_atlas([*dict.fromkeys(shown), WHITE])
-        for name in (*(PICTURES if "textures" in plan.forced else ()), *(HOLES if "cutouts" in plan.forced else ())):
-            materials[name][materials[name] == -1] = picture[WHITE]
+    if plan.forced & LOOKED_UP.keys():
+        used = used_materials(prepared.scene)
+        shown = itertools.chain(*(readings_of(material, prepared.plan) for material in used))
+        textures, picture = build_atlas([*dict.fromkeys(shown), WHITE, FLAT])
+    for effect, (names, stand_in) in LOOKED_UP.items():
+        for name in names:
+            if effect not in plan.names:
+                materials[name] = -1
+            elif effect in plan.forced:
+                materials[name][materials[name] == -1] = picture[stand_in]
     lights, area_lights = surfaces.lights.copy(), surfaces.area_lights.copy()
     for table, effect in ((lights, "shadows"), (area_lights, "soft_shadows")):
         if effect not in plan.names:

@@ -102,13 +102,13 @@ class _Reader:
     materials: dict[int, GltfMaterial] = field(default_factory=dict)
     primitives: dict[int, list[Mesh]] = field(default_factory=dict)
     triangles: int = 0
+    notes: list[str] = field(default_factory=list)
 
     def model(self) -> Model:
         """The content of all nodes of the scene."""
         meshes: list[Mesh] = []
         lights: list[StatedLight] = []
         cameras: list[Camera] = []
-        notes: list[str] = []
         for node, world_from_node in self._nodes():
             if "mesh" in node:
                 meshes.extend(placed(mesh, world_from_node) for mesh in self._shown(node))
@@ -120,10 +120,10 @@ class _Reader:
                     self.data.entry("cameras", node.integer("camera", 0, LARGEST_INDEX)), world_from_node
                 )
                 if camera is None:
-                    notes.append(f"{node.place}: an orthographic camera is left out")
+                    self.notes.append(f"{node.place}: an orthographic camera is left out")
                 else:
                     cameras.append(camera)
-        return Model(tuple(meshes), tuple(lights), camera=cameras[0] if cameras else None, notes=tuple(notes))
+        return Model(tuple(meshes), tuple(lights), camera=cameras[0] if cameras else None, notes=tuple(self.notes))
 
     def _shown(self, node: Fields) -> list[Mesh]:
         """The meshes of a node, not yet placed."""
@@ -174,6 +174,7 @@ class _Reader:
             look = GltfMaterial(DEFAULT_MATERIAL)
             if "material" in primitive:
                 look = self._material(primitive.integer("material", 0, LARGEST_INDEX))
+            stated = look.material.normal_texture is not None and look.uv_transform is None
             yield Mesh(
                 vertices,
                 _faces(primitive, mode, indices),
@@ -183,6 +184,7 @@ class _Reader:
                     self._matching(attributes, f"TEXCOORD_{look.texcoord}", "VEC2", len(vertices)), look
                 ),
                 name=f"{self.data.top.file}: {name!r}",
+                tangents=self._matching(attributes, "TANGENT", "VEC4", len(vertices)) if stated else None,
             )
 
     def _matching(self, attributes: Fields, key: str, kind: str, count: int) -> NDArray[np.float64] | None:
@@ -198,6 +200,7 @@ class _Reader:
         if index not in self.materials:
             fields = self.data.entry("materials", index)
             self.materials[index] = read_material(fields, fields.text("name", fields.place), self._texture)
+            self.notes.extend(self.materials[index].notes)
         return self.materials[index]
 
     def _texture(self, info: Fields) -> Texture:

@@ -11,10 +11,11 @@
 | KHR_materials_ior | ior, 1.5 unless stated, where KHR_materials_volume has a thickness; else 1, a thin sheet |
 | alphaMode MASK | holes where the alpha of the base colour is below alphaCutoff |
 | alphaMode BLEND, alpha a | where t = 0: transmission = 1 - a with ior 1; holes where its texture is below 1/2 |
+| normalTexture, its scale | normal_texture, normal_scale, where it is laid on like the base colour texture |
 | KHR_materials_unlit | emission = base, no diffuse (with a texture it is lit: emission has none) |
 
 What is let through is taken from the diffuse. Of the metallic-roughness and emissive textures, and of the
-base colour texture where it tints a mirror or glass, the mean counts. Normal and occlusion maps are skipped.
+base colour texture where it tints a mirror or glass, the mean counts. Occlusion maps are skipped.
 
 Source: Khronos glTF 2.0 specification, section 3.9 and appendix B; the extensions' own documents.
 """
@@ -31,7 +32,7 @@ from numpy.typing import NDArray
 
 from renderer.errors import SettingsError
 from renderer.fields import Fields
-from renderer.scene import BLACK, MAX_RADIANCE, Material, Rgb, Texture
+from renderer.scene import BLACK, MAX_NORMAL_SCALE, MAX_RADIANCE, Material, Rgb, Texture
 from renderer.texture import srgb_to_linear
 
 MIN_ROUGHNESS: Final = 0.1
@@ -50,13 +51,15 @@ class GltfMaterial:
 
     Attributes:
         material: as the renderer sees it.
-        texcoord: which set of texture coordinates its texture takes.
+        texcoord: which set of texture coordinates its textures take.
         uv_transform: (2, 3) float64 matrix for (u, v, 1), v down as in glTF; None for none.
+        notes: what was left out, for people.
     """
 
     material: Material
     texcoord: int = 0
     uv_transform: NDArray[np.float64] | None = None
+    notes: tuple[str, ...] = ()
 
 
 def read_material(fields: Fields, name: str, load: _LOAD) -> GltfMaterial:
@@ -75,7 +78,13 @@ def read_material(fields: Fields, name: str, load: _LOAD) -> GltfMaterial:
     base: Rgb = (red, green, blue)
     info = pbr.table("baseColorTexture") if "baseColorTexture" in pbr else None
     texture = load(info) if info is not None else None
-    texcoord, uv_transform = _laid_on(info) if info is not None else (0, None)
+    bumps = fields.table("normalTexture") if "normalTexture" in fields else None
+    laid_on = info if info is not None else bumps
+    texcoord, uv_transform = _laid_on(laid_on) if laid_on is not None else (0, None)
+    notes: tuple[str, ...] = ()
+    if bumps is not None and not _same_place(_laid_on(bumps), (texcoord, uv_transform)):
+        bumps = None
+        notes = (f"material {name!r}: a normal map that is laid on otherwise than the colours is left out",)
     if "KHR_materials_unlit" in extensions and texture is None:
         return GltfMaterial(Material(name, diffuse=BLACK, emission=base))
     tint = base if texture is None else _times(base, _mean_light(texture))
@@ -105,10 +114,12 @@ def read_material(fields: Fields, name: str, load: _LOAD) -> GltfMaterial:
             diffuse_texture=texture,
             alpha_texture=texture if mode != "OPAQUE" and texture is not None and texture.alpha is not None else None,
             alpha_cutoff=cutoff,
+            normal_texture=load(bumps) if bumps is not None else None,
+            normal_scale=bumps.number("scale", -MAX_NORMAL_SCALE, MAX_NORMAL_SCALE, 1.0) if bumps is not None else 1.0,
         )
     except SettingsError as error:
         raise fields.in_file(error) from None
-    return GltfMaterial(material, texcoord, uv_transform)
+    return GltfMaterial(material, texcoord, uv_transform, notes)
 
 
 def _metallic_roughness(pbr: Fields, load: _LOAD) -> tuple[float, float]:
@@ -138,7 +149,17 @@ def _emission(fields: Fields, extensions: Fields, load: _LOAD) -> Rgb:
     return _scaled(emission, strength)
 
 
-def _laid_on(info: Fields) -> tuple[int, NDArray[np.float64] | None]:
+_Place = tuple[int, NDArray[np.float64] | None]
+
+
+def _same_place(a: _Place, b: _Place) -> bool:
+    """Whether two textures are laid on alike."""
+    if a[1] is None or b[1] is None:
+        return a[0] == b[0] and a[1] is b[1]
+    return a[0] == b[0] and np.array_equal(a[1], b[1])
+
+
+def _laid_on(info: Fields) -> _Place:
     """The set of texture coordinates of a texture, and their transform (KHR_texture_transform)."""
     texcoord = info.integer("texCoord", 0, 63, 0)
     extensions = info.table("extensions")

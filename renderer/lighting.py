@@ -18,6 +18,12 @@ from renderer.surface import OFFSET_ULPS, Surface
 
 
 @formula
+def _is_behind(material: Any, finish: Finish, lx: float, ly: float, lz: float) -> bool:
+    """Whether a bump looks through its own surface at the light in direction (lx, ly, lz)."""
+    return bool(material.normal_picture >= 0 and finish.hx * lx + finish.hy * ly + finish.hz * lz <= 0.0)
+
+
+@formula
 def _light_to_eye(
     s: Surface,
     material: Any,
@@ -37,7 +43,7 @@ def _light_to_eye(
     inverse = 1.0 / math.sqrt(square)
     tx, ty, tz = tx * inverse, ty * inverse, tz * inverse
     cosine = tx * s.nx + ty * s.ny + tz * s.nz
-    if cosine <= 0.0:
+    if cosine <= 0.0 or _is_behind(material, finish, tx, ty, tz):
         return 0.0, 0.0, 0.0, 0.0
     red, green, blue = reflectance(s, material, finish, cosine, tx, ty, tz, vx, vy, vz)
     falloff = inverse * inverse
@@ -151,7 +157,7 @@ def light_from_areas(
             inverse = 1.0 / math.sqrt(tx * tx + ty * ty + tz * tz)
             lx, ly, lz = tx * inverse, ty * inverse, tz * inverse
             cosine = lx * s.nx + ly * s.ny + lz * s.nz
-            if not cosine > 0.0:
+            if not cosine > 0.0 or _is_behind(material, finish, lx, ly, lz):
                 continue
             red, green, blue = reflectance(s, material, finish, cosine, lx, ly, lz, -dx, -dy, -dz)
             share /= each

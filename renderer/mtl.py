@@ -1,9 +1,9 @@
 """Materials of OBJ files (.mtl) as this renderer's materials.
 
-The statements `Kd Ks Ns Ke illum Ni Tf d Tr map_Kd map_Ks map_d` are
-honoured, in any case of letters; all others are
-skipped, and so are the options of maps but for `-clamp on`. A highlight `Ks` is meant relative to `Kd` under the
-same light, so it becomes specular = Ks/pi.
+The statements `Kd Ks Ns Ke illum Ni Tf d Tr map_Kd map_Ks map_d norm` are
+honoured, in any case of letters; `map_Kn` is another name of `norm`, a normal map. All others are
+skipped, also the heights of `map_Bump`, and so are the options of maps but for `-clamp on`. A highlight `Ks` is
+meant relative to `Kd` under the same light, so it becomes specular = Ks/pi.
 
 | illum | becomes |
 |---|---|
@@ -38,7 +38,7 @@ GLASS_IOR = 1.5
 """Index of refraction of glass whose file states none."""
 
 _HONOURED = frozenset({"kd", "ks", "ke", "tf", "ns", "ni", "d", "tr", "illum"})
-_MAPS = frozenset({"map_kd", "map_ks", "map_d"})
+_MAPS = frozenset({"map_kd", "map_ks", "map_d", "norm", "map_kn"})
 _WHITE: Rgb = (1.0, 1.0, 1.0)
 _MIRRORS = (3, 5, 8)
 _GLASS = (4, 6, 7, 9)
@@ -162,6 +162,7 @@ def _material(name: str, block: _Statements) -> Material:
         diffuse_texture=texture,
         specular_texture=shine,
         alpha_texture=block.maps.get("map_d"),
+        normal_texture=block.maps.get("norm", block.maps.get("map_kn")),
     )
 
 

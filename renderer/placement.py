@@ -20,8 +20,8 @@ def placed(mesh: Mesh, world_from_mesh: NDArray[np.float64]) -> Mesh:
 
     Returns:
         The mesh with moved vertices. Normals follow by the inverse transpose, so that they stay square to
-        the surface; where the transform mirrors, the faces are wound the other way, so that counter-clockwise
-        still means outside.
+        the surface, tangents by the transform itself; where the transform mirrors, the faces are wound the
+        other way, so that counter-clockwise still means outside, and tangents change their handedness.
 
     Raises:
         SceneError: for vertices that leave the range of a scene.
@@ -31,11 +31,16 @@ def placed(mesh: Mesh, world_from_mesh: NDArray[np.float64]) -> Mesh:
     with np.errstate(all="ignore"):
         vertices = mesh.vertices @ linear.T + world_from_mesh[:3, 3]
         normals = None if mesh.normals is None else mesh.normals @ cofactor.T
+        tangents = mesh.tangents
+        if tangents is not None:
+            side = -tangents[:, 3:] if mirrors else tangents[:, 3:]
+            tangents = np.hstack([tangents[:, :3] @ linear.T, side])
     return dataclasses.replace(
         mesh,
         vertices=vertices,
         faces=np.ascontiguousarray(mesh.faces[:, ::-1]) if mirrors else mesh.faces,
         normals=normals,
+        tangents=tangents,
     )
 
 

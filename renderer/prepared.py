@@ -21,11 +21,12 @@ from renderer.area_light import area_light_table
 from renderer.atlas import TextureAtlas, build_atlas
 from renderer.direction import unit
 from renderer.effect_choice import EffectChoice
-from renderer.effects import EffectPlan, has_highlight, has_holes, is_boundary, pictures_of, plan_effects
+from renderer.effects import EffectPlan, plan_effects
 from renderer.errors import SceneError
 from renderer.intersection import Intersector
 from renderer.light_reach import reaching_lights
-from renderer.scene import Material, Mesh, PointLight, Scene, Sphere, Texture
+from renderer.material_table import GRAINED, material_table, readings_of, used_materials
+from renderer.scene import Material, Mesh, PointLight, Scene, Sphere
 from renderer.sphere import SphereTree, build_sphere_tree
 from renderer.tangent import TANGENT, mesh_tangents
 
@@ -37,40 +38,6 @@ SMOOTH_COLUMN = 25
 NORMAL_COLUMN = 26
 REACH_COLUMN = 29
 DENSITY_COLUMN = 30
-
-SPECULAR = 1
-MIRROR = 2
-BOUNDARY = 4
-LIT = 8
-REFRACTS = 16
-MIRROR_ANYWAY = 32
-REFRACTS_ANYWAY = 64
-MICROFACETS = 256
-GRAINED = 512
-SPAWNS = MIRROR | REFRACTS | MIRROR_ANYWAY | REFRACTS_ANYWAY
-"""Bits of what a material calls for: a `BOUNDARY` mirrors by Fresnel's equations, `REFRACTS` sends rays through
-it; the two `ANYWAY` send rays though they bring nothing, as forced effects do; `MICROFACETS` is the base of
-Ashikhmin and Shirley, `GRAINED` a tangent."""
-
-
-_COLOURS = [
-    (f"{name}_{channel}", np.float32)
-    for name in ("diffuse", "specular", "emission", "reflection", "transmission")
-    for channel in ("red", "green", "blue")
-]
-
-MATERIAL = np.dtype(
-    [
-        *_COLOURS,
-        *((name, np.float32) for name in ("shininess", "ior", "exponent_u", "exponent_v")),
-        ("alpha_cutoff", np.float32),
-        ("picture", np.int32),
-        ("specular_picture", np.int32),
-        ("alpha_picture", np.int32),
-        ("calls", np.int32),
-    ]
-)
-"""One material as the kernels read it; pictures are -1 without a texture, `calls` are the bits above."""
 
 LIGHT = np.dtype([*((name, np.float64) for name in ("x", "y", "z", "red", "green", "blue")), ("casts", np.int64)])
 """One point light in scene units; `casts` is 1 where shadow rays are to be traced."""
@@ -84,7 +51,8 @@ class Surfaces(NamedTuple):
             position, unit normal and texture coordinates; then the row of its material, 1 where the
             corner normals are not the triangle's own, its own unit normal, its largest coordinate, and its
             texture coordinates per scene unit.
-        tangents: (m, TANGENT) float32, see `tangent`; (0, TANGENT) where no material is grained.
+        tangents: (m, TANGENT) float32, see `tangent`; (0, TANGENT) where no material is grained or
+            has a normal map that shows.
         spheres: analytic spheres.
         materials: (k,) MATERIAL, each that something visible has.
         lights: (l,) LIGHT, each point light that can be noticed.
@@ -159,10 +127,12 @@ def prepare(scene: Scene) -> PreparedScene:
     plan = plan_effects(scene)
     center, scale = _centre_and_scale(scene)
     materials = used_materials(scene)
-    atlas, picture = build_atlas(list(dict.fromkeys(itertools.chain(*map(pictures_of, materials)))))
+    readings = itertools.chain(*(readings_of(material, plan) for material in materials))
+    atlas, picture = build_atlas(list(dict.fromkeys(readings)))
     row = {material: index for index, material in enumerate(materials)}
-    vertices, faces, facets, tangents, casts = _triangles(scene, row, center, scale)
-    table = _material_table(materials, picture, plan)
+    table = material_table(materials, picture, plan)
+    directed = (table["calls"] & GRAINED != 0) | (table["normal_picture"] >= 0)
+    vertices, faces, facets, tangents, casts = _triangles(scene, row, directed, center, scale)
     pierced = table["alpha_picture"] >= 0
     whole = ~pierced[facets[:, MATERIAL_COLUMN].astype(np.int64)]
     spheres = _sphere_tree(
@@ -250,52 +220,6 @@ MAX_SCALE_EXPONENT = 60
 """Scenes smaller than 2^-60 m are not made larger: a camera 1e15 m away must stay within float32."""
 
 
-def used_materials(scene: Scene) -> list[Material]:
-    """Materials that a triangle or sphere has, each once, in order of first use."""
-    used = dict.fromkeys(mesh.material for mesh in scene.meshes if len(mesh.faces))
-    used.update(dict.fromkeys(sphere.material for sphere in scene.spheres))
-    return list(used)
-
-
-def _material_table(materials: list[Material], picture: dict[Texture, int], plan: EffectPlan) -> NDArray[np.void]:
-    table = np.zeros(len(materials), dtype=MATERIAL)
-    for row, material in enumerate(materials):
-        for name in ("diffuse", "specular", "emission", "reflection", "transmission"):
-            for channel, value in zip(("red", "green", "blue"), getattr(material, name), strict=True):
-                table[row][f"{name}_{channel}"] = value
-        for name in ("shininess", "ior", "exponent_u", "exponent_v", "alpha_cutoff"):
-            table[row][name] = getattr(material, name)
-        holes = material.alpha_texture if "cutouts" in plan.names and has_holes(material) else None
-        for name, texture in (
-            ("picture", material.diffuse_texture),
-            ("specular_picture", material.specular_texture),
-            ("alpha_picture", holes),
-        ):
-            table[row][name] = picture.get(texture, -1) if texture else -1
-        table[row]["calls"] = calls_of(material, plan)
-    return table
-
-
-def calls_of(material: Material, plan: EffectPlan) -> int:
-    """The bits of what a material calls for, of what the plan lets run."""
-    return (
-        (SPECULAR if "specular" in plan.names and (has_highlight(material) or "specular" in plan.forced) else 0)
-        | (MIRROR if "reflection" in plan.names and (any(material.reflection) or is_boundary(material)) else 0)
-        | (MIRROR_ANYWAY if "reflection" in plan.forced else 0)
-        | (BOUNDARY if any(material.transmission) else 0)
-        | (REFRACTS if "refraction" in plan.names and any(material.transmission) else 0)
-        | (REFRACTS_ANYWAY if "refraction" in plan.forced else 0)
-        | (LIT if any(material.diffuse) or has_highlight(material) else 0)
-        | (MICROFACETS if material.base == "ashikhmin-shirley" else 0)
-        | (GRAINED if _is_grained(material) else 0)
-    )
-
-
-def _is_grained(material: Material) -> bool:
-    """Whether it matters for its looks where the texture coordinate u runs."""
-    return material.base == "ashikhmin-shirley" and material.exponent_u != material.exponent_v
-
-
 def _light_table(
     lights: list[PointLight], plan: EffectPlan, center: NDArray[np.float64], scale: float
 ) -> NDArray[np.void]:
@@ -311,21 +235,30 @@ def _light_table(
 _Triangles = tuple[NDArray[np.float32], NDArray[np.int32], NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_]]
 
 
-def _triangles(scene: Scene, row: dict[Material, int], center: NDArray[np.float64], scale: float) -> _Triangles:
-    """Vertices, faces, facets, tangents and shadow flags of all meshes together."""
+def _triangles(
+    scene: Scene, row: dict[Material, int], directed: NDArray[np.bool_], center: NDArray[np.float64], scale: float
+) -> _Triangles:
+    """Vertices, faces, facets, tangents and shadow flags of all meshes together.
+
+    Args:
+        scene: with the meshes.
+        row: of each material in the material table.
+        directed: (k,) bool rows of the material table that need tangents.
+        center, scale: of the scene's units.
+    """
     meshes = [mesh for mesh in scene.meshes if len(mesh.faces)]
     vertices = [np.zeros((0, 3), dtype=np.float32)]
     faces = [np.zeros((0, 3), dtype=np.int64)]
     facets = aligned_facets(sum(len(mesh.faces) for mesh in meshes))
-    grained = any(_is_grained(mesh.material) for mesh in meshes)
-    tangents = np.zeros((len(facets) if grained else 0, TANGENT), dtype=np.float32)
+    any_directed = any(directed[row[mesh.material]] for mesh in meshes)
+    tangents = np.zeros((len(facets) if any_directed else 0, TANGENT), dtype=np.float32)
     casts = np.zeros(len(facets), dtype=np.bool_)
     first_vertex = first_face = 0
     for mesh in meshes:
         local = ((mesh.vertices - center) * scale).astype(np.float32)
         part = slice(first_face, first_face + len(mesh.faces))
         _fill_facets(mesh, local, row[mesh.material], facets[part])
-        if _is_grained(mesh.material):
+        if directed[row[mesh.material]]:
             tangents[part] = mesh_tangents(mesh)
         vertices.append(local)
         faces.append(mesh.faces + first_vertex)
@@ -339,7 +272,7 @@ def _triangles(scene: Scene, row: dict[Material, int], center: NDArray[np.float6
         kept = aligned_facets(len(keep))
         kept[:] = facets[keep]
         facets = kept
-        tangents = tangents[keep] if grained else tangents
+        tangents = tangents[keep] if any_directed else tangents
     return np.concatenate(vertices), np.concatenate(faces).astype(np.int32)[keep], facets, tangents, casts[keep]
 
 

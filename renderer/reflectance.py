@@ -10,7 +10,7 @@ import numpy as np
 from renderer.ashikhmin_shirley import ashikhmin_shirley, matt_share
 from renderer.finish import Finish
 from renderer.kernel import formula
-from renderer.prepared import MICROFACETS, SPECULAR
+from renderer.material_table import MICROFACETS, SPECULAR
 from renderer.surface import Surface
 
 INVERSE_PI = 1.0 / math.pi

@@ -25,6 +25,9 @@ MAX_COORDINATE_M = 1e12
 MAX_SHININESS = 1e9
 """Largest exponent of a highlight."""
 
+MAX_NORMAL_SCALE = 1e3
+"""Largest factor of the bumps of a normal map."""
+
 BASES = ("phong", "ashikhmin-shirley")
 """Models of how a surface scatters light."""
 
@@ -45,7 +48,7 @@ class Texture:
     seen small.
 
     Attributes:
-        pixels: (h, w, 3) uint8, sRGB-coded, row 0 at the top; v = 0 is the bottom edge.
+        pixels: (h, w, 3) uint8, sRGB-coded but in normal maps, row 0 at the top; v = 0 is the bottom edge.
         name: for messages.
         wrap_u, wrap_v: `repeat`, `clamp` or `mirror`, across and up.
         alpha: (h, w) uint8, 255 where it is whole; None for a picture without. Colours are not multiplied by it.
@@ -105,6 +108,9 @@ class Material:
         alpha_texture: cuts holes where its alpha (without alpha: its green) is below `alpha_cutoff`; rays of
             every kind pass them. None for none.
         alpha_cutoff: 0 to 1.
+        normal_texture: bends the shading normal: the code c of red stands for the component 2c - 1 along the
+            texture coordinate u, green along v, blue out of the surface; not sRGB-coded. None for none.
+        normal_scale: multiplies the components along u and v, -1000 to 1000.
         base: `phong` or `ashikhmin-shirley`.
         exponent_u, exponent_v: exponents of the highlight of `ashikhmin-shirley` along and across the grain,
             0 to 1e9; the grain runs along the texture coordinate u, round a sphere along its parallels. The
@@ -130,6 +136,8 @@ class Material:
     specular_texture: Texture | None = None
     alpha_texture: Texture | None = None
     alpha_cutoff: float = 0.5
+    normal_texture: Texture | None = None
+    normal_scale: float = 1.0
 
     def __post_init__(self) -> None:
         where = f"material {self.name!r}"
@@ -150,6 +158,7 @@ class Material:
             require_number(f"{where}.{label}", exponent, 0.0, MAX_SHININESS)
         require_number(f"{where}.ior", self.ior, 0.1, 10.0)
         require_number(f"{where}.alpha_cutoff", self.alpha_cutoff, 0.0, 1.0)
+        require_number(f"{where}.normal_scale", self.normal_scale, -MAX_NORMAL_SCALE, MAX_NORMAL_SCALE)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -165,6 +174,9 @@ class Mesh:
         uvs: (n, 2) float64 texture coordinates; None for none.
         casts_shadows: whether it stands between a light and what the light falls on.
         name: for messages.
+        tangents: (n, 4) float64: where the texture coordinate u runs at each vertex, of any length, and 1 where
+            v runs along the cross product of normal and tangent, -1 where against it; None: as the texture
+            coordinates say. They count on smooth meshes only.
 
     Raises:
         SceneError: naming the mesh, for wrong shapes, indices out of range or vertices that are not finite.
@@ -177,6 +189,7 @@ class Mesh:
     uvs: NDArray[np.float64] | None = None
     casts_shadows: bool = True
     name: str = "mesh"
+    tangents: NDArray[np.float64] | None = None
 
     def __post_init__(self) -> None:
         n = len(self.vertices)
@@ -194,6 +207,8 @@ class Mesh:
             _require_shape(self.name, "normals", self.normals, (n, 3))
         if self.uvs is not None:
             _require_shape(self.name, "uvs", self.uvs, (n, 2))
+        if self.tangents is not None:
+            _require_shape(self.name, "tangents", self.tangents, (n, 4))
 
 
 @dataclass(frozen=True, slots=True)

@@ -45,6 +45,8 @@ specular = [0.5, 0.5, 0.5]
 specular_texture = { file = "worn.png", wrap_u = "mirror", wrap_v = "clamp" }  # or repeat
 alpha_texture = "wood.png"         # holes where its alpha (without alpha: its green) is below alpha_cutoff
 alpha_cutoff = 0.5                 # or 0.5
+normal_texture = "bumps.png"       # bends normals: red along u, green along v (up), blue outwards; not sRGB
+normal_scale = 1.0                 # or 1: how deep its bumps are
 
 [materials.glass]
 diffuse = [0.0, 0.0, 0.0]
@@ -117,6 +119,7 @@ from renderer.scene import (
     BASES,
     BLACK,
     MAX_COORDINATE_M,
+    MAX_NORMAL_SCALE,
     MAX_RADIANCE,
     MAX_SHININESS,
     WRAPS,
@@ -212,7 +215,9 @@ class _Reader:
         return Scene(tuple(meshes), tuple(spheres), lights, surroundings, camera, exposure, title, camera_path)
 
     def _material(self, fields: Fields, name: str) -> Material:
-        texture, shine, holes = (self._texture(fields, f"{kind}_texture") for kind in ("diffuse", "specular", "alpha"))
+        texture, shine, holes, bumps = (
+            self._texture(fields, f"{kind}_texture") for kind in ("diffuse", "specular", "alpha", "normal")
+        )
         base = fields.choice("base", BASES, _DEFAULTS.base)
         brightest = MAX_RADIANCE if base == "phong" else 1.0
         material = Material(
@@ -228,6 +233,8 @@ class _Reader:
             specular_texture=shine,
             alpha_texture=holes,
             alpha_cutoff=fields.number("alpha_cutoff", 0.0, 1.0, _DEFAULTS.alpha_cutoff),
+            normal_texture=bumps,
+            normal_scale=fields.number("normal_scale", -MAX_NORMAL_SCALE, MAX_NORMAL_SCALE, _DEFAULTS.normal_scale),
             base=base,
             exponent_u=fields.number("exponent_u", 0.0, MAX_SHININESS, _DEFAULTS.exponent_u),
             exponent_v=fields.number("exponent_v", 0.0, MAX_SHININESS, _DEFAULTS.exponent_v),

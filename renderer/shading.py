@@ -14,9 +14,8 @@ from renderer.grain import sphere_tangent, triangle_tangent
 from renderer.kernel import formula, kernel, prefetch
 from renderer.light_samples import LightSamples
 from renderer.lighting import light_from_areas, light_from_points
-from renderer.prepared import (
+from renderer.material_table import (
     BOUNDARY,
-    DENSITY_COLUMN,
     GRAINED,
     LIT,
     MIRROR,
@@ -24,11 +23,13 @@ from renderer.prepared import (
     REFRACTS,
     REFRACTS_ANYWAY,
     SPAWNS,
-    Surfaces,
 )
+from renderer.normal_map import bumped, mirroring
+from renderer.prepared import DENSITY_COLUMN, Surfaces
 from renderer.rays import Hits, Rays, ShadowRays
 from renderer.reflectance import even_light
 from renderer.surface import Surface, sphere_surface, triangle_surface, weights_at
+from renderer.tangent import HANDED_COLUMN
 from renderer.texture import filtered
 
 SPHERE_DENSITY = 0.5 / math.sqrt(math.pi)
@@ -103,7 +104,8 @@ def shade(
     center, radius, sphere_material = surfaces.spheres.center, surfaces.spheres.radius, surfaces.spheres.material
     materials, around = surfaces.materials, surfaces.surroundings
     lights, area_lights = surfaces.lights, surfaces.area_lights
-    texels, pictures, linear = surfaces.textures.texels, surfaces.textures.pictures, surfaces.textures.linear
+    texels, pictures = surfaces.textures.texels, surfaces.textures.pictures
+    linear, signed = surfaces.textures.linear, surfaces.textures.signed
     origin, direction, weight, sample_of = rays.origin, rays.direction, rays.weight, rays.sample
     pencil, child_pencil = rays.pencil, children.pencil
     primitive_of, distance = hits.primitive, hits.distance
@@ -154,7 +156,8 @@ def shade(
         sr, sg, sb = float(material.specular_red), float(material.specular_green), float(material.specular_blue)
         mr, mg, mb = float(material.reflection_red), float(material.reflection_green), float(material.reflection_blue)
         width = np.float64(pencil[ray, 0]) + np.float64(pencil[ray, 1]) * np.float64(distance[ray])
-        if material.picture >= 0 or material.specular_picture >= 0:
+        hx, hy, hz = s.nx, s.ny, s.nz
+        if material.picture >= 0 or material.specular_picture >= 0 or material.normal_picture >= 0:
             density = (
                 np.float64(facets[primitive, DENSITY_COLUMN])
                 if primitive < triangles
@@ -168,13 +171,25 @@ def shade(
                 tr, tg, tb = filtered(texels, linear, pictures, material.specular_picture, area, s.u, s.v)
                 sr, sg, sb = sr * tr, sg * tg, sb * tb
                 mr, mg, mb = mr * tr, mg * tg, mb * tb
+            if material.normal_picture >= 0:
+                x, y, z = filtered(texels, signed, pictures, material.normal_picture, area, s.u, s.v)
+                x, y = x * material.normal_scale, y * material.normal_scale
+                if x != 0.0 or y != 0.0:
+                    out = 1.0 if s.entering else -1.0
+                    if primitive >= triangles:
+                        tx, ty, tz = sphere_tangent(s)
+                        s = bumped(s, tx, ty, tz, x, out * y, z, dx, dy, dz)
+                    elif tangents[primitive, HANDED_COLUMN] != 0.0:
+                        tx, ty, tz = triangle_tangent(tangents, primitive, b1, b2, s)
+                        handed = np.float64(tangents[primitive, HANDED_COLUMN])
+                        s = bumped(s, tx, ty, tz, out * x, handed * y, z, dx, dy, dz)
         ux, uy, uz = 0.0, 0.0, 0.0
         if material.calls & GRAINED != 0:
             if primitive < triangles:
                 ux, uy, uz = triangle_tangent(tangents, primitive, b1, b2, s)
             else:
                 ux, uy, uz = sphere_tangent(s)
-        finish = Finish(kr, kg, kb, sr, sg, sb, ux, uy, uz)
+        finish = Finish(kr, kg, kb, sr, sg, sb, ux, uy, uz, hx, hy, hz)
         ar, ag, ab = even_light(s, material, finish, dx, dy, dz)
         radiance[sample, 0] += wr * (material.emission_red + ar * around[2, 0])
         radiance[sample, 1] += wg * (material.emission_green + ag * around[2, 1])
@@ -225,6 +240,8 @@ def shade(
             child_origin[n_children, 0] = s.px + s.offset * s.gx
             child_origin[n_children, 1] = s.py + s.offset * s.gy
             child_origin[n_children, 2] = s.pz + s.offset * s.gz
+            if material.normal_picture >= 0:
+                s = mirroring(s, hx, hy, hz, dx, dy, dz)
             rx, ry, rz = _mirrored(s, dx, dy, dz)
             child_direction[n_children, 0] = rx
             child_direction[n_children, 1] = ry

@@ -7,7 +7,8 @@ hairy ball); this one, the constant field of a plane projected stereographically
 single point, straight down. That is the frame of Frisvad (2012) with its pole below; the reformulation of
 Duff et al. (2017) is more accurate at the pole but jumps along the whole equator.
 
-A grain has no sense of direction: a tangent and its opposite look the same.
+A grain has no sense of direction: a tangent and its opposite look the same. Normal maps need more: the side on
+which v runs, too, which is the other one where texture coordinates are mirrored.
 """
 
 from __future__ import annotations
@@ -19,16 +20,25 @@ from renderer.direction import unit
 from renderer.kernel import formula
 from renderer.scene import Mesh
 
-TANGENT = 9
-"""Numbers of a triangle's tangents: a unit vector for each corner, 0 where nothing says where u runs."""
+TANGENT = 10
+"""Numbers of a triangle's tangents: a unit vector for each corner, 0 where nothing says where u runs; handedness."""
+
+HANDED_COLUMN = 9
+"""1 where v runs along the cross product of the outward normal and the tangent, -1 where against it, 0 where
+nothing says."""
 
 
 def mesh_tangents(mesh: Mesh) -> NDArray[np.float64]:
-    """(m, TANGENT) float64: where u runs at the corners of each face.
+    """(m, TANGENT) float64: where u runs at the corners of each face, and its handedness.
 
-    On a smooth mesh the faces around a vertex share a tangent, their mean by area; on a flat one each face
-    has its own. Faces without extent in texture coordinates get zeros.
+    A smooth mesh may state tangents. Else the faces around a vertex share one, their mean by area, those with
+    mirrored texture coordinates another; on a flat mesh each face has its own. Faces without extent in texture
+    coordinates get zeros.
     """
+    if mesh.tangents is not None and mesh.normals is not None:
+        stated = mesh.tangents[mesh.faces]
+        sides = np.sign(np.nan_to_num(stated[:, :, 3])).sum(axis=1, keepdims=True)
+        return np.hstack([unit(stated[:, :, :3]).reshape(-1, HANDED_COLUMN), np.sign(sides)])
     if mesh.uvs is None:
         return np.zeros((len(mesh.faces), TANGENT))
     corners, uvs = mesh.vertices[mesh.faces], mesh.uvs[mesh.faces]
@@ -39,13 +49,15 @@ def mesh_tangents(mesh: Mesh) -> NDArray[np.float64]:
         along_u = winding[:, None] * (edge_1 * dv_2[:, None] - edge_2 * dv_1[:, None])
         own = unit(along_u)
         area = np.linalg.norm(np.cross(edge_1, edge_2), axis=1, keepdims=True)
+    handed = np.nan_to_num(winding)[:, None]
     if mesh.normals is None:
-        return np.tile(own, (1, 3))
+        return np.hstack([np.tile(own, (1, 3)), handed])
     largest = float(area.max(initial=0.0))
-    shared = np.zeros((len(mesh.vertices), 3))
+    shared = np.zeros((2 * len(mesh.vertices), 3))
+    place = mesh.faces + len(mesh.vertices) * (handed < 0.0)
     for corner in range(3):
-        np.add.at(shared, mesh.faces[:, corner], own * (area / largest if largest > 0.0 else area))
-    return unit(shared)[mesh.faces].reshape(-1, TANGENT)
+        np.add.at(shared, place[:, corner], own * (area / largest if largest > 0.0 else area))
+    return np.hstack([unit(shared)[place].reshape(-1, HANDED_COLUMN), handed])
 
 
 @formula

@@ -148,7 +148,7 @@ def filtered(
     """Colour at (u, v) of a picture as it is seen by a footprint: between the two levels next to its size.
 
     Args:
-        texels, linear, pictures: of the atlas.
+        texels, linear, pictures: of the atlas; its `signed` in place of `linear` for a normal map.
         row: of the picture's largest level.
         area: of the footprint in texture coordinates.
     """

@@ -14,7 +14,9 @@ def every_effect() -> Scene:
     floor = Mesh(
         vertices=np.array([[-9, 0, -9], [9, 0, -9], [9, 0, 9], [-9, 0, 9]], dtype=np.float64),
         faces=np.array([[0, 2, 1], [0, 3, 2]]),
-        material=Material("floor", specular=(0.1, 0.1, 0.1), diffuse_texture=checks, alpha_texture=checks),
+        material=Material(
+            "floor", specular=(0.1, 0.1, 0.1), diffuse_texture=checks, alpha_texture=checks, normal_texture=checks
+        ),
         normals=np.array([[0.1, 1, 0], [0, 1, 0.1], [-0.1, 1, 0], [0, 1, -0.1]]),
         uvs=np.array([[0, 0], [9, 0], [9, 9], [0, 9]], dtype=np.float64),
     )

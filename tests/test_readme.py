@@ -143,7 +143,7 @@ def test_the_scene_file_is_read_as_it_stands(tmp_path: Path) -> None:
     (example,) = blocks(README, "toml")
     (tmp_path / "scene.toml").write_text(example)
     trimesh.creation.icosphere(subdivisions=2, radius=10).export(tmp_path / "vase.obj")
-    for name in ("wood.png", "worn.png"):
+    for name in ("wood.png", "worn.png", "bumps.png"):
         (tmp_path / name).write_bytes(encode(np.full((4, 4, 3), 99, dtype=np.uint8), "png"))
     scene = load_scene_folder(tmp_path)
     assert scene.title == "A vase on a table"

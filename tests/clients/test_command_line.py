@@ -95,7 +95,7 @@ def test_help_imports_nothing_slow() -> None:
         ((*RENDER, "--samples", "many"), "--samples: invalid int value: 'many'"),
         ((*RENDER, "--max-depth", "-1"), "--max-depth: expected an integer from 0 to 64"),
         ((*RENDER, "--shadow-samples", "0"), "--shadow-samples: expected an integer from 1 to 4096, found 0"),
-        ((*RENDER, "--effects", "+fog"), "--effects: expected effects out of cutouts, textures, specular"),
+        ((*RENDER, "--effects", "+fog"), "--effects: expected effects out of cutouts, textures, normal_maps"),
         ((*RENDER, "--bucket", "9999"), "--bucket: expected an integer from 0 to 512"),
         ((*RENDER, "--map", "hexagonal"), "--map: expected one of aligned, scanline, full"),
         ((*RENDER, "--antialiasing", "x"), "--antialiasing: expected one of stochastic"),

@@ -32,6 +32,8 @@ materials = st.builds(
     specular_texture=st.sampled_from([None, Texture(np.uint8([[[0] * 3], [[255] * 3]]), "s", "clamp", "mirror")]),
     alpha_texture=st.sampled_from([None, Texture(np.uint8([[[0] * 3, [255] * 3]]))]),
     diffuse_texture=st.sampled_from([None, Texture(np.uint8([[[0] * 3, [255] * 3, [9] * 3]]))]),
+    normal_texture=st.sampled_from([None, Texture(np.uint8([[[0] * 3, [255] * 3, [9, 128, 200], [128, 128, 0]]]))]),
+    normal_scale=st.sampled_from([-1000.0, 1e-30, 1.0]),
 )
 spheres = st.builds(
     Sphere, positions, st.sampled_from([1e-9, 0.25, 0.5, 1.0, 1e3, 1e9]), materials, casts_shadows=st.booleans()

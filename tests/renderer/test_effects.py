@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -16,6 +18,10 @@ CAMERA = Camera((0, 2, 8), (0, 0.5, 0))
 CHECKS = Texture(np.uint8([[[0] * 3, [255] * 3]]), "checks")
 SHINY = Material("shiny", specular=(0.5, 0.5, 0.5))
 METAL = Material("metal", diffuse=BLACK, specular=BLACK, base="ashikhmin-shirley")
+BUMPS = Texture(np.uint8([[[40, 128, 255], [128, 128, 255]]]), "bumps")
+FLAT = Texture(np.uint8([[[127, 128, 255], [128, 127, 90]]]), "flat")
+BUMPY = Material("bumpy", normal_texture=BUMPS)
+AMBIENT = Surroundings(ambient=WHITE)
 GHOST_FLOOR = floor(WHITE_LAMBERT, casts_shadows=False)
 
 
@@ -55,6 +61,11 @@ def test_a_matte_scene_traces_primary_rays_only(renderer: Renderer) -> None:
         (Scene(meshes=(floor(Material(diffuse_texture=CHECKS)),)), ("textures",), set()),
         (Scene(meshes=(floor(Material(reflection=(0.5,) * 3, specular_texture=CHECKS)),)), ("textures", "reflection"),
          {"reflection"}),
+        (Scene(meshes=(floor(BUMPY, casts_shadows=False),), lights=LIGHTS), ("normal_maps",), set()),
+        (Scene(spheres=(ball(dataclasses.replace(BUMPY, diffuse=BLACK, reflection=WHITE)),)),
+         ("normal_maps", "reflection"), {"reflection"}),
+        (Scene(meshes=(floor(dataclasses.replace(METAL, normal_texture=BUMPS)),), surroundings=AMBIENT),
+         ("normal_maps",), set()),
         (Scene(spheres=(ball(lamp()),), lights=LIGHTS), (), set()),
         (Scene(), (), set()),
     ],
@@ -80,6 +91,10 @@ def test_an_effect_runs_where_something_calls_for_it(
         Scene(meshes=(floor(Material(diffuse=BLACK, diffuse_texture=CHECKS)),)),
         Scene(meshes=(floor(Material(specular_texture=CHECKS)),)),
         Scene(meshes=(GHOST_FLOOR,), spheres=(ball(Material(reflection=BLACK, transmission=BLACK, ior=2.0)),)),
+        Scene(meshes=(floor(BUMPY),), surroundings=AMBIENT),
+        Scene(meshes=(floor(Material(normal_texture=FLAT), casts_shadows=False),), lights=LIGHTS),
+        Scene(meshes=(floor(dataclasses.replace(BUMPY, normal_scale=0.0), casts_shadows=False),), lights=LIGHTS),
+        Scene(meshes=(floor(dataclasses.replace(BUMPY, diffuse=BLACK), casts_shadows=False),), lights=LIGHTS),
     ],
     ids=[
         "a mirror that no face has",
@@ -90,6 +105,10 @@ def test_an_effect_runs_where_something_calls_for_it(
         "a texture times black",
         "a specular texture without a highlight",
         "an index without transmission",
+        "bumps without a light",
+        "a normal map that is flat",
+        "bumps of no height",
+        "bumps of what sends nothing back",
     ],
 )
 def test_what_cannot_be_seen_calls_for_nothing(renderer: Renderer, scene: Scene) -> None:

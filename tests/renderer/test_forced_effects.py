@@ -23,7 +23,8 @@ from renderer.scenes import BUILT_IN
 from tests.renderer.drawing import WHITE_LAMBERT, floor, glass, light, mirror
 
 CHECKS = Texture(np.uint8([[[40] * 3, [255] * 3], [[255] * 3, [40] * 3]]), "checks")
-TILES = Material("tiles", diffuse_texture=CHECKS)
+BUMPS = Texture(np.uint8([[[90, 128, 220], [128, 150, 250]]]), "bumps")
+TILES = Material("tiles", diffuse_texture=CHECKS, normal_texture=BUMPS)
 SHINY = Material("shiny", diffuse=(0.3, 0.4, 0.5), specular=(0.6,) * 3)
 LACE = dataclasses.replace(SHINY, alpha_texture=CHECKS)
 PANEL = RectangleLight((-1, 3, -1), (2, 0, 0), (0, 0, 2), (2.0,) * 3)
@@ -108,7 +109,7 @@ def test_an_effect_that_is_not_called_for_may_be_left_out(renderer: Renderer, ef
             assert forced.cost.rays.total == forced.cost.rays.primary
 
 
-@pytest.mark.parametrize("effect", ["textures", "specular", "reflection", "refraction"])
+@pytest.mark.parametrize("effect", ["textures", "normal_maps", "specular", "reflection", "refraction"])
 def test_forced_on_where_nothing_calls_for_it_an_effect_brings_nothing_but_its_cost(
     renderer: Renderer, effect: str
 ) -> None:
@@ -157,6 +158,7 @@ def test_an_effect_forced_off_leaves_the_scene_without_it(renderer: Renderer) ->
     quiet = {kind: tuple(dataclasses.replace(lamp, casts_shadows=False) for lamp in scene.lights) for kind in "ps"}
     others: dict[str, Scene] = {
         "textures": without(scene, diffuse_texture=None),
+        "normal_maps": without(scene, normal_texture=None),
         "specular": without(scene, specular=BLACK),
         "shadows": dataclasses.replace(scene, lights=(quiet["p"][0], scene.lights[1])),
         "soft_shadows": dataclasses.replace(scene, lights=(scene.lights[0], quiet["s"][1])),

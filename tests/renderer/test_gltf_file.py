@@ -252,6 +252,59 @@ def test_gltf_textures_from_files_and_buffers(tmp_path: Path) -> None:
         np.testing.assert_allclose(mesh.uvs, [[0.5, 1], [2.5, 1], [0.5, -2]])
 
 
+def bumpy_gltf(stated: dict[str, Any], colours: dict[str, Any] | None = None, **nodes: object) -> dict[str, object]:
+    """A file whose material has a normal map, and whose triangle has TANGENT: along y, w = -1."""
+    tangents = np.array([[0, 1, 0, -1]] * 3, "<f4").tobytes()
+    document = gltf()
+    document["buffers"].append(
+        {"byteLength": len(tangents), "uri": "data:;base64," + base64.b64encode(tangents).decode()}
+    )
+    document["bufferViews"].append({"buffer": len(document["buffers"]) - 1, "byteLength": len(tangents)})
+    document["accessors"].append(
+        {"bufferView": len(document["bufferViews"]) - 1, "componentType": 5126, "count": 3, "type": "VEC4"}
+    )
+    document["meshes"][0]["primitives"][0]["attributes"]["TANGENT"] = len(document["accessors"]) - 1
+    document["images"] = [{"uri": "a.png"}]
+    document["textures"] = [{"source": 0}]
+    pbr = {"baseColorTexture": {"index": 0, **colours}} if colours is not None else {}
+    document["materials"] = [{"name": "m", "normalTexture": {"index": 0, **stated}, "pbrMetallicRoughness": pbr}]
+    document["nodes"] = [{"mesh": 0, **nodes}]
+    return dict(document)
+
+
+def test_gltf_normal_maps_with_tangents(tmp_path: Path) -> None:
+    """A mirrored node turns the tangents with the surface, and their handedness round."""
+    (tmp_path / "a.png").write_bytes(png((200, 100, 250)))
+    for name, document, tangent in (
+        ("plain", bumpy_gltf({"scale": 0.5}), [0, 1, 0, -1]),
+        ("coloured", bumpy_gltf({"scale": 0.5}, {}), [0, 1, 0, -1]),
+        ("mirrored", bumpy_gltf({"scale": 0.5}, scale=[1, -2, 1]), [0, -2, 0, 1]),
+    ):
+        (mesh,) = load(tmp_path, f"{name}.gltf", json.dumps(document))
+        assert mesh.material.normal_texture is not None
+        np.testing.assert_array_equal(mesh.material.normal_texture.pixels, [[[200, 100, 250]]])
+        assert mesh.material.normal_scale == 0.5
+        np.testing.assert_array_equal(mesh.tangents, [tangent] * 3)
+
+
+def test_gltf_normal_maps_laid_on_in_their_own_way(tmp_path: Path) -> None:
+    """Alone, they take their transform along, and tangents from the coordinates; beside other colours they are
+    left out with a note."""
+    (tmp_path / "a.png").write_bytes(png((200, 100, 250)))
+    turned = {"extensions": {"KHR_texture_transform": {"scale": [2, 3]}}}
+    for colours in (None, turned):
+        (mesh,) = load(tmp_path, "a.gltf", json.dumps(bumpy_gltf(turned, colours)))
+        assert mesh.material.normal_texture is not None
+        assert mesh.tangents is None
+        np.testing.assert_allclose(mesh.uvs, [[0, 1], [2, 1], [0, -2]])
+    (tmp_path / "b.gltf").write_text(json.dumps(bumpy_gltf(turned, {})))
+    model = load_model(tmp_path / "b.gltf")
+    assert model.meshes[0].material.normal_texture is None
+    assert model.notes == ("material 'm': a normal map that is laid on otherwise than the colours is left out",)
+    message = refused(tmp_path, "c.gltf", json.dumps(bumpy_gltf({"scale": 1e9})))
+    assert message.startswith("c.gltf: materials[0].normalTexture.scale: expected a number in [-1000, 1000]")
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [

@@ -139,6 +139,11 @@ def test_maps_of_highlights_and_maps_that_are_clamped(tmp_path: Path) -> None:
     assert (shiny.specular_texture.wrap_u, shiny.specular_texture.wrap_v) == ("clamp", "clamp")
     assert shiny.diffuse_texture.wrap_u == "repeat"
     assert shiny.reflection == (1.0, 1.0, 1.0)
+    assert shiny.normal_texture is None
+    for statement in ("norm -bm 1 a.png", "map_Kn a.png", "map_Bump none.png\nnorm a.png"):
+        bumpy = material(tmp_path, statement)
+        assert bumpy.normal_texture is not None
+        assert bumpy.normal_texture.pixels.tolist() == [[[10, 20, 30]]]
     holes = material(tmp_path, "map_d a.png")
     assert holes.alpha_texture is not None
     assert holes.alpha_texture.opacity.tolist() == [[20]]

@@ -33,6 +33,9 @@ f 2 3 4
 """
 
 
+BALL = '[[sphere]]\ncenter = [0, 0, 0]\nradius = 1\nmaterial = "m"\n'
+
+
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     """A folder with the files of the worked example."""
@@ -42,7 +45,7 @@ def folder(tmp_path: Path) -> Path:
     (place / "vase.mtl").write_text("newmtl Body\nKd 0.1 0.2 0.3\nnewmtl Lid\nKd 0.4 0.5 0.6\n")
     picture = io.BytesIO()
     Image.new("RGB", (2, 2), (10, 20, 30)).save(picture, "png")
-    for name in ("wood.png", "worn.png"):
+    for name in ("wood.png", "worn.png", "bumps.png"):
         (place / name).write_bytes(picture.getvalue())
     return place
 
@@ -106,7 +109,7 @@ def test_the_worked_example_shows_every_field(folder: Path) -> None:
     assert fields | {"emission"} == {
         "diffuse", "specular", "shininess", "emission", "reflection", "transmission", "ior", "diffuse_texture",
         "base", "exponent_u", "exponent_v", "specular_texture",
-        "alpha_texture", "alpha_cutoff",
+        "alpha_texture", "alpha_cutoff", "normal_texture", "normal_scale",
     }  # fmt: skip
 
 
@@ -138,6 +141,11 @@ def test_textures_and_how_they_go_on(folder: Path) -> None:
     assert (wood.diffuse_texture.wrap_u, wood.diffuse_texture.wrap_v) == ("repeat", "repeat")
     assert wood.alpha_texture is wood.diffuse_texture
     assert wood.alpha_cutoff == 0.5
+    assert wood.normal_texture is not None
+    assert wood.normal_texture is not wood.diffuse_texture
+    deeper = load(folder, '[materials.m]\nnormal_texture = "bumps.png"\nnormal_scale = -2\n' + BALL).spheres[0].material
+    assert deeper.normal_texture is not None
+    assert (deeper.normal_scale, wood.normal_scale) == (-2.0, 1.0)
     assert (wood.specular_texture.wrap_u, wood.specular_texture.wrap_v) == ("mirror", "clamp")
 
 
@@ -262,6 +270,10 @@ RECTANGLE = "[[light]]\nkind = 'rectangle'\ncorner = [0, 0, 0]\nradiance = [1, 1
         (
             "[materials.red]\nspecular_texture = { file = 'wood.png', wrap = 'clamp' }",
             "vase/scene.toml: materials.red.specular_texture.wrap: expected one of the fields file, wrap_u, wrap_v",
+        ),
+        (
+            "[materials.red]\nnormal_scale = 1e4",
+            "vase/scene.toml: materials.red.normal_scale: expected a number in [-1000",
         ),
         (
             "[materials.red]\ndiffuse_texture = 7",

@@ -1,0 +1,87 @@
+"""Normal maps: surfaces that look as if they had bumps.
+
+A texel (red, green, blue) stands for the components of a normal along the texture coordinate u, along v, and
+out of the surface: 2c - 1 for each code c from 0 to 1, no sRGB decoding, as in glTF 2.0 (section 3.9.3). The
+two codes around the middle, 127 and 128, both stand for exactly 0, and nothing points into the surface.
+Components are filtered like colours, the mean over the footprint of the ray, and the result has unit length
+again.
+
+A bent normal b may still face away from the ray, or mirror it into the surface. It is then pulled towards the
+normal h that it was bent from, to b + t h with the least t that will do. With v against the ray, B = b.v,
+G = b.h and V = h.v > 0:
+
+- to face the ray takes t = -B / V; the surface is then seen edge-on;
+- to mirror it no deeper than along the plane of h takes the larger root of V t^2 + 2 B t + (2 B G - V) = 0,
+  where the product with v is the root of the discriminant, so that it faces the ray as well.
+
+Lights need the former only, mirror rays the latter. Where h itself leans away from the ray, as on the outline
+of a smooth mesh, the face's own normal takes its place.
+"""
+
+from __future__ import annotations
+
+import math
+
+from renderer.kernel import formula
+from renderer.surface import Surface
+
+
+@formula
+def _with_normal(s: Surface, nx: float, ny: float, nz: float) -> Surface:
+    """The surface with another shading normal, of any length; one without length leaves it as it is."""
+    square = nx * nx + ny * ny + nz * nz
+    if not square > 0.0:
+        return s
+    inverse = 1.0 / math.sqrt(square)
+    return Surface(
+        s.px, s.py, s.pz, s.gx, s.gy, s.gz, nx * inverse, ny * inverse, nz * inverse,
+        s.u, s.v, s.offset, s.lift, s.material, s.entering,
+    )  # fmt: skip
+
+
+@formula
+def _facing(
+    s: Surface, hx: float, hy: float, hz: float, dx: float, dy: float, dz: float
+) -> tuple[float, float, float, float]:
+    """The normal to pull towards, h or else the face's own, and how much it faces the ray."""
+    facing = -(dx * hx + dy * hy + dz * hz)
+    if facing > 0.0:
+        return hx, hy, hz, facing
+    return s.gx, s.gy, s.gz, -(dx * s.gx + dy * s.gy + dz * s.gz)
+
+
+@formula
+def bumped(
+    s: Surface, tx: float, ty: float, tz: float, x: float, y: float, z: float, dx: float, dy: float, dz: float
+) -> Surface:
+    """The surface with its shading normal n bent by a normal map; it faces the ray.
+
+    Args:
+        s: the surface.
+        tx, ty, tz: unit vector t across n.
+        x, y, z: components of the bent normal along t, along n x t, and along n, of any length.
+        dx, dy, dz: direction of the ray that met it.
+    """
+    z = max(0.0, z)
+    bx = x * tx + y * (s.ny * tz - s.nz * ty) + z * s.nx
+    by = x * ty + y * (s.nz * tx - s.nx * tz) + z * s.ny
+    bz = x * tz + y * (s.nx * ty - s.ny * tx) + z * s.nz
+    toward = -(dx * bx + dy * by + dz * bz)
+    if toward < 0.0:
+        hx, hy, hz, facing = _facing(s, s.nx, s.ny, s.nz, dx, dy, dz)
+        bx, by, bz = facing * bx - toward * hx, facing * by - toward * hy, facing * bz - toward * hz
+    return _with_normal(s, bx, by, bz)
+
+
+@formula
+def mirroring(s: Surface, hx: float, hy: float, hz: float, dx: float, dy: float, dz: float) -> Surface:
+    """A surface that `bumped` bent from the unit normal h, with a normal that mirrors the ray off it."""
+    if s.nx == hx and s.ny == hy and s.nz == hz:
+        return s
+    hx, hy, hz, facing = _facing(s, hx, hy, hz, dx, dy, dz)
+    toward = -(dx * s.nx + dy * s.ny + dz * s.nz)
+    upright = s.nx * hx + s.ny * hy + s.nz * hz
+    pull = math.sqrt(max(0.0, toward * toward + facing * facing - 2.0 * toward * upright * facing)) - toward
+    if not pull > 0.0:
+        return s
+    return _with_normal(s, facing * s.nx + pull * hx, facing * s.ny + pull * hy, facing * s.nz + pull * hz)
