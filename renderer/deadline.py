@@ -23,6 +23,10 @@ LADDER = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)
 """Factors on the acuity scale, finest first; the coarsest leaves about a fiftieth of the cells."""
 
 
+HARDLY = 0.1
+"""Share of the time for map and reconstruction that tracing may add to a frame that is late anyway."""
+
+
 class Work(NamedTuple):
     """What a frame of one acuity takes.
 
@@ -82,6 +86,9 @@ def samples_lacking(held: NDArray[np.float64], wanted: int) -> float:
 def choose_acuity(works: Iterable[Work], pixels: int, rates: Rates, left_ns: float) -> Work:
     """The first of `works` whose frame with one sample a cell fits into `left_ns`, else the last.
 
+    Where map and reconstruction alone do not fit, coarser cells cannot help but by what tracing takes: the first
+    whose tracing hardly matters beside them is chosen.
+
     Args:
         works: one or more, finest first; asked for one by one.
         pixels: of the screen.
@@ -92,7 +99,8 @@ def choose_acuity(works: Iterable[Work], pixels: int, rates: Rates, left_ns: flo
     for work in works:
         chosen = work
         around = (rates.frame_pixel + (rates.map_pixel if work.new_map else 0.0)) * pixels
-        if around + rates.sample * samples_lacking(work.held, 1) <= left_ns:
+        tracing = rates.sample * samples_lacking(work.held, 1)
+        if around + tracing <= left_ns or (around > left_ns and tracing <= HARDLY * around):
             break
     assert chosen is not None
     return chosen

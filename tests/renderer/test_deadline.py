@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from renderer.acuity import MAX_SCALE, Acuity
-from renderer.deadline import LADDER, Work, choose_acuity, choose_samples, ladder, samples_lacking
+from renderer.deadline import HARDLY, LADDER, Work, choose_acuity, choose_samples, ladder, samples_lacking
 from renderer.display import Display
 from renderer.errors import SettingsError
 from renderer.frame import FrameRequest
@@ -52,8 +52,21 @@ def test_the_finest_acuity_that_fits_with_one_sample_is_chosen_or_the_coarsest(
 ) -> None:
     works = [Work(Acuity(scale=scale), *part) for scale, part in zip(LADDER, parts, strict=False)]
     chosen = choose_acuity(iter(works), PIXELS, speed, left_ns)
-    fitting = [work for work in works if predicted_ns(speed, work, 1) <= left_ns]
+    fitting = []
+    for work in works:
+        whole, around = predicted_ns(speed, work, 1), predicted_ns(speed, work, 0)
+        if whole <= left_ns or (around > left_ns and whole - around <= HARDLY * around):
+            fitting.append(work)
     assert chosen is (fitting[0] if fitting else works[-1])
+
+
+def test_a_frame_that_is_late_anyway_is_not_made_coarser_than_it_helps() -> None:
+    """The map alone takes 5,000 of 3,000 ns: 40 new cells at 10 ns are let be, 400 are not."""
+    speed = Rates(5.0, 0.0, 10.0)
+    few, many, coarse = (Work(Acuity(), True, np.array([cells, 0.0])) for cells in (40.0, 400.0, 20.0))
+    assert choose_acuity([few, coarse], PIXELS, speed, 3000) is few
+    assert choose_acuity([many, coarse], PIXELS, speed, 3000) is coarse
+    assert choose_acuity([few._replace(new_map=False), coarse], PIXELS, speed, 399) is coarse
 
 
 def test_known_choices() -> None:
@@ -169,7 +182,7 @@ def test_samples_that_are_there_make_finer_frames_fit(scene: PreparedScene) -> N
     """With rates at which nothing can be traced but a stored frame can be shown."""
     made = Renderer(threads=2)
     full = made.render(scene, asked("aligned", None))
-    patient = Rates(1e9, 0.0, 1e9)
+    patient = Rates(1.0, 0.0, 1e9)
     made._pace.rates = lambda *_: patient  # type: ignore[method-assign]
     again = made.render(scene, asked("aligned", 1000))
     assert (again.cost.acuity_scale, again.cost.samples_per_cell, again.cost.samples_traced) == (8.0, 3, 0)
