@@ -11,13 +11,7 @@ from renderer.acuity import Acuity
 from renderer.display import Display
 from renderer.eccentricity import EyeGeometry, eye_geometry, fill_cell_sizes, largest_cell_side
 from renderer.gaze import GazeBucket
-from renderer.tiling import (
-    mark_aligned,
-    mark_scanline,
-    number_cells,
-    number_scanline_cells,
-    strip_rows,
-)
+from renderer.tiling import mark_scanline, number_cells, number_scanline_cells, tile_side, tile_strip
 from renderer.workers import Workers
 
 FULL_STRIP_ROWS = 64
@@ -81,29 +75,39 @@ def build_cell_map(kind: str, display: Display, acuity: Acuity, bucket: GazeBuck
 def cell_sizes(display: Display, acuity: Acuity, bucket: GazeBucket) -> NDArray[np.uint16]:
     """rho of every pixel, (h, w) uint16 [px]: the largest cell side the eye allows there for any gaze of `bucket`."""
     sizes = np.zeros((display.height_px, display.width_px), dtype=np.uint16)
-    fill_cell_sizes(eye_geometry(display, acuity, bucket), 0, sizes)
+    fill_cell_sizes(eye_geometry(display, acuity, bucket), 0, 0, sizes)
     return sizes
 
 
 def _full_map(display: Display, bucket: GazeBucket) -> CellMap:
     width, height = display.width_px, display.height_px
-    corners = np.ones((height, width), dtype=np.uint16)
-    return _numbered("full", bucket, [corners], [width * height], height)
+    mask = np.arange(width * height, dtype=np.int32).reshape(height, width)
+    y, x = (part.ravel() for part in np.indices(mask.shape, dtype=np.int32))
+    return CellMap("full", bucket, x, y, np.ones_like(x), mask)
 
 
 def _aligned_map(eye: EyeGeometry, bucket: GazeBucket, pool: Workers) -> CellMap:
-    rows = strip_rows(largest_cell_side(eye), eye.height_px)
-    tops = range(0, eye.height_px, rows)
-    corners = [np.zeros((min(rows, eye.height_px - top), eye.width_px), dtype=np.uint16) for top in tops]
-    counts = [0] * len(tops)
+    tile_px = tile_side(largest_cell_side(eye))
+    tops = range(0, eye.height_px, tile_px)
+    tiles = -(-eye.width_px // tile_px)
+    shape = (tiles, min(tile_px, eye.height_px), min(tile_px, eye.width_px))
+    corners = [np.zeros(shape, dtype=np.uint16) for _ in tops]
+    sides = np.zeros((len(tops), tiles), dtype=np.uint16)
+    counts = np.zeros(len(tops), dtype=np.int64)
 
     def tile(strip: int) -> None:
-        sizes = np.zeros_like(corners[strip])
-        fill_cell_sizes(eye, tops[strip], sizes)
-        counts[strip] = mark_aligned(sizes, corners[strip])
+        counts[strip] = tile_strip(eye, tile_px, tops[strip], corners[strip], sides[strip])
 
     pool.run(tile, len(tops))
-    return _numbered("aligned", bucket, corners, counts, rows, pool)
+    first = np.concatenate(([0], np.cumsum(counts)))
+    x, y, side = (np.zeros(int(first[-1]), dtype=np.int32) for _ in range(3))
+    mask = np.zeros((eye.height_px, eye.width_px), dtype=np.int32)
+
+    def number(strip: int) -> None:
+        number_cells(tops[strip], int(first[strip]), corners[strip], sides[strip], x, y, side, mask)
+
+    pool.run(number, len(tops))
+    return CellMap("aligned", bucket, x, y, side, mask)
 
 
 def _scanline_map(eye: EyeGeometry, bucket: GazeBucket, pool: Workers) -> CellMap:
@@ -112,7 +116,7 @@ def _scanline_map(eye: EyeGeometry, bucket: GazeBucket, pool: Workers) -> CellMa
 
     def measure(strip: int) -> None:
         top = strip * FULL_STRIP_ROWS
-        fill_cell_sizes(eye, top, sizes[top : top + FULL_STRIP_ROWS])
+        fill_cell_sizes(eye, top, 0, sizes[top : top + FULL_STRIP_ROWS])
 
     pool.run(measure, -(-eye.height_px // FULL_STRIP_ROWS))
     corners = np.zeros(shape, dtype=np.uint16)
@@ -121,27 +125,3 @@ def _scanline_map(eye: EyeGeometry, bucket: GazeBucket, pool: Workers) -> CellMa
     x, y, side = (np.zeros(count, dtype=np.int32) for _ in range(3))
     number_scanline_cells(corners, x, y, side)
     return CellMap("scanline", bucket, x, y, side, mask)
-
-
-def _numbered(
-    kind: str,
-    bucket: GazeBucket,
-    corners: list[NDArray[np.uint16]],
-    counts: list[int],
-    rows: int,
-    pool: Workers | None = None,
-) -> CellMap:
-    """Number the cells of strips of `rows` rows whose corners are marked."""
-    first = np.concatenate(([0], np.cumsum(counts, dtype=np.int64)))
-    x, y, side = (np.zeros(int(first[-1]), dtype=np.int32) for _ in range(3))
-    mask = np.zeros((sum(len(strip) for strip in corners), corners[0].shape[1]), dtype=np.int32)
-
-    def number(strip: int) -> None:
-        number_cells(corners[strip], strip * rows, int(first[strip]), x, y, side, mask)
-
-    if pool is None:
-        for strip in range(len(corners)):
-            number(strip)
-    else:
-        pool.run(number, len(corners))
-    return CellMap(kind, bucket, x, y, side, mask)

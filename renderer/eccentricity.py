@@ -265,9 +265,18 @@ def _even_cell_size(eye: EyeGeometry, x: float, y: float, reach: float) -> int:
     return int(low) if int(low) == int(high) else 0
 
 
+@formula
+def even_tile_size(eye: EyeGeometry, top: int, left: int, side_px: int) -> int:
+    """rho of every pixel of the square tile at (left, top) if it is the same for all of them, else, perhaps, 0 [px]."""
+    y = (top + 0.5 * side_px - eye.height_px / 2) * eye.pitch_y
+    x = (left + 0.5 * side_px - eye.width_px / 2) * eye.pitch_x
+    diagonal = math.sqrt(eye.pitch_x * eye.pitch_x + eye.pitch_y * eye.pitch_y)
+    return _even_cell_size(eye, x, y, 0.5 * side_px * diagonal)
+
+
 @roomy_kernel
-def fill_cell_sizes(eye: EyeGeometry, first_row: int, sizes: NDArray[np.uint16]) -> None:
-    """Write rho of the pixels of rows first_row .. first_row + rows - 1 into `sizes`, (rows, w) uint16 [px].
+def fill_cell_sizes(eye: EyeGeometry, first_row: int, first_column: int, sizes: NDArray[np.uint16]) -> None:
+    """Write rho of the pixels from (first_column, first_row) on into `sizes`, (rows, columns) uint16 [px].
 
     Blocks over which rho provably does not change are filled at once; others are quartered, down to pixels.
     """
@@ -283,7 +292,7 @@ def fill_cell_sizes(eye: EyeGeometry, first_row: int, sizes: NDArray[np.uint16])
                 top, left, side = pending[count, 0], pending[count, 1], pending[count, 2]
                 bottom, right = min(rows, top + side), min(columns, left + side)
                 y = (first_row + top + 0.5 * side - eye.height_px / 2) * eye.pitch_y
-                x = (left + 0.5 * side - eye.width_px / 2) * eye.pitch_x
+                x = (first_column + left + 0.5 * side - eye.width_px / 2) * eye.pitch_x
                 even = _even_cell_size(eye, x, y, 0.5 * side * diagonal)
                 if even > 0:
                     for row in range(top, bottom):
@@ -300,5 +309,5 @@ def fill_cell_sizes(eye: EyeGeometry, first_row: int, sizes: NDArray[np.uint16])
                     for row in range(top, bottom):
                         y = (first_row + row + 0.5 - eye.height_px / 2) * eye.pitch_y
                         for column in range(left, right):
-                            x = (column + 0.5 - eye.width_px / 2) * eye.pitch_x
+                            x = (first_column + column + 0.5 - eye.width_px / 2) * eye.pitch_x
                             sizes[row, column] = int(cell_size(eye, x, y))

@@ -9,6 +9,9 @@ cover whole units, so each level looks at one cell of the grid where it would lo
 rho, which takes the uncovered pixels in it.
 
 A *corner* array says where cells begin: the side of the cell at its top-left pixel, 0 elsewhere.
+
+The screen is tiled tile by tile, each a square of the screen that no aligned square crosses. Where rho is the same
+all over a tile, which holds for most, it is a plain grid of squares, and no pixel of it is looked at.
 """
 
 from __future__ import annotations
@@ -16,31 +19,67 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.eccentricity import EyeGeometry, even_tile_size, fill_cell_sizes
 from renderer.kernel import formula, kernel, roomy_kernel
 
-TILE_PX = 32
-"""Width of the columns in which cells are numbered, so that neighbours on the screen are near in memory [px]."""
+LEAST_TILE_PX = 24
+"""Least side of a tile [px]: three quarters of such tiles of a desktop screen are plain grids."""
 
 
-def strip_rows(largest_side: int, height_px: int) -> int:
-    """Rows of the horizontal strips that `aligned` can tile one by one, every square being inside one strip.
-
-    A multiple of all sides up to `largest_side`, at least 48 where the screen is that high.
-    """
+def tile_side(largest_side: int) -> int:
+    """Side of the tiles that can be tiled one by one [px]: a multiple of all aligned sides up to `largest_side`."""
     period = 1
     while period * 2 <= largest_side:
         period *= 2
     period *= 3
-    return min(height_px, period * max(1, -(-48 // period)))
+    return period * max(1, -(-LEAST_TILE_PX // period))
+
+
+@roomy_kernel
+def tile_strip(eye: EyeGeometry, tile_px: int, top: int, corners: NDArray[np.uint16], sides: NDArray[np.uint16]) -> int:
+    """Tile one row of tiles and return how many cells it has.
+
+    Args:
+        eye: screen and eye.
+        tile_px: side of a tile.
+        top: first row of the tiles on the screen.
+        corners: (tiles, rows, columns) uint16, all 0 on entry, a tile's size or the screen's where that is smaller;
+            corners of the tiles that are no plain grid.
+        sides: (tiles,) uint16, all 0 on entry; side of the squares of a tile that is a plain grid.
+    """
+    rows = min(tile_px, eye.height_px - top)
+    count = 0
+    for tile in range(len(sides)):
+        left = tile * tile_px
+        columns = min(tile_px, eye.width_px - left)
+        even = even_tile_size(eye, top, left, tile_px) if rows == tile_px and columns == tile_px else 0
+        if even > 0:
+            sides[tile] = _aligned_side(even)
+            across = tile_px // sides[tile]
+            count += across * across
+        else:
+            sizes = np.zeros((rows, columns), dtype=np.uint16)
+            fill_cell_sizes(eye, top, left, sizes)
+            count += mark_aligned(sizes, corners[tile])
+    return count
+
+
+@formula
+def _aligned_side(size: int) -> int:
+    """Largest aligned side, of 1, 2, 3, 4, 6, 8, ..., up to `size`."""
+    side = 1
+    while 2 * side <= size:
+        side *= 2
+    return 3 * (side // 2) if side >= 2 and 3 * (side // 2) <= size else side
 
 
 @roomy_kernel
 def mark_aligned(sizes: NDArray[np.uint16], corners: NDArray[np.uint16]) -> int:
-    """Tile one strip: write the corners of its aligned squares into `corners` and return how many there are.
+    """Tile one tile: write the corners of its aligned squares into `corners` and return how many there are.
 
     Args:
-        sizes: (rows, w) uint16 rho of its pixels [px].
-        corners: (rows, w) uint16, all 0 on entry.
+        sizes: (rows, columns) uint16 rho of its pixels [px].
+        corners: (rows or more, columns or more) uint16, all 0 on entry.
     """
     rows, columns = sizes.shape
     largest = 1
@@ -147,40 +186,70 @@ def mark_scanline(sizes: NDArray[np.uint16], corners: NDArray[np.uint16], mask: 
 
 @kernel
 def number_cells(
-    corners: NDArray[np.uint16],
-    first_row: int,
+    top: int,
     first_cell: int,
+    corners: NDArray[np.uint16],
+    sides: NDArray[np.uint16],
     x: NDArray[np.int32],
     y: NDArray[np.int32],
     side: NDArray[np.int32],
     mask: NDArray[np.int32],
 ) -> None:
-    """Number the cells of one strip, column of tiles by column of tiles, and fill the mask.
+    """Number the cells of one row of tiles, tile by tile, and fill the mask.
 
     Args:
-        corners: (rows, w) uint16 of the strip.
-        first_row: of the strip on the screen.
-        first_cell: number of the strip's first cell.
+        top: first row of the tiles on the screen.
+        first_cell: number of their first cell.
+        corners, sides: of `tile_strip`.
         x, y, side: (n,) int32 cell vector of the whole map, written from `first_cell` on.
-        mask: (h, w) int32 of the whole map, the strip's rows written.
+        mask: (h, w) int32 of the whole map, the tiles' rows written.
     """
-    rows, columns = corners.shape
+    height, width = mask.shape
+    rows, columns = corners.shape[1:]
+    bottom = min(height, top + rows)
     cell = first_cell
-    for left in range(0, columns, TILE_PX):
-        for row in range(rows):
-            for column in range(left, min(columns, left + TILE_PX)):
-                length = int(corners[row, column])
+    for tile in range(len(sides)):
+        left = tile * columns
+        right = min(width, left + columns)
+        if sides[tile] > 0:
+            cell = _number_grid(top, left, bottom, right, int(sides[tile]), cell, x, y, side, mask)
+            continue
+        for row in range(top, bottom):
+            for column in range(left, right):
+                length = int(corners[tile, row - top, column - left])
                 if length == 0:
                     continue
-                x[cell] = column
-                y[cell] = first_row + row
-                side[cell] = length
-                mask[first_row + row, column] = cell
-                if length > 1:
-                    for below in range(first_row + row, first_row + row + length):
-                        for beside in range(column, column + length):
-                            mask[below, beside] = cell
+                x[cell], y[cell], side[cell] = column, row, length
+                for below in range(row, row + length):
+                    for beside in range(column, column + length):
+                        mask[below, beside] = cell
                 cell += 1
+
+
+@formula
+def _number_grid(
+    top: int,
+    left: int,
+    bottom: int,
+    right: int,
+    length: int,
+    cell: int,
+    x: NDArray[np.int32],
+    y: NDArray[np.int32],
+    side: NDArray[np.int32],
+    mask: NDArray[np.int32],
+) -> int:
+    """Number the squares of `length` pixels of a tile that is a plain grid; return the number after the last."""
+    across = (right - left) // length
+    for row in range(top, bottom, length):
+        for part in range(across):
+            x[cell + part], y[cell + part], side[cell + part] = left + part * length, row, length
+        for below in range(row, row + length):
+            for part in range(across):
+                for beside in range(length):
+                    mask[below, left + part * length + beside] = cell + part
+        cell += across
+    return cell
 
 
 @kernel
