@@ -23,8 +23,9 @@ LADDER = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)
 """Factors on the acuity scale, finest first; the coarsest leaves about a fiftieth of the cells."""
 
 
-HARDLY = 0.1
-"""Share of the time for map and reconstruction that tracing may add to a frame that is late anyway."""
+LATE_SHARE = 0.5
+"""Share of the time for map and reconstruction that tracing may add to a frame that is late anyway: a coarser map
+costs as much as a fine one, and another one when the gaze rests."""
 
 
 class Work(NamedTuple):
@@ -87,7 +88,7 @@ def choose_acuity(works: Iterable[Work], pixels: int, rates: Rates, left_ns: flo
     """The first of `works` whose frame with one sample a cell fits into `left_ns`, else the last.
 
     Where map and reconstruction alone do not fit, coarser cells cannot help but by what tracing takes: the first
-    whose tracing hardly matters beside them is chosen.
+    whose tracing takes at most half their time is chosen.
 
     Args:
         works: one or more, finest first; asked for one by one.
@@ -100,7 +101,7 @@ def choose_acuity(works: Iterable[Work], pixels: int, rates: Rates, left_ns: flo
         chosen = work
         around = (rates.frame_pixel + (rates.map_pixel if work.new_map else 0.0)) * pixels
         tracing = rates.sample * samples_lacking(work.held, 1)
-        if around + tracing <= left_ns or (around > left_ns and tracing <= HARDLY * around):
+        if around + tracing <= left_ns or (around > left_ns and tracing <= LATE_SHARE * around):
             break
     assert chosen is not None
     return chosen

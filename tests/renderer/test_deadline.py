@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from renderer.acuity import MAX_SCALE, Acuity
-from renderer.deadline import HARDLY, LADDER, Work, choose_acuity, choose_samples, ladder, samples_lacking
+from renderer.deadline import LADDER, LATE_SHARE, Work, choose_acuity, choose_samples, ladder, samples_lacking
 from renderer.display import Display
 from renderer.errors import SettingsError
 from renderer.frame import FrameRequest
@@ -55,18 +55,18 @@ def test_the_finest_acuity_that_fits_with_one_sample_is_chosen_or_the_coarsest(
     fitting = []
     for work in works:
         whole, around = predicted_ns(speed, work, 1), predicted_ns(speed, work, 0)
-        if whole <= left_ns or (around > left_ns and whole - around <= HARDLY * around):
+        if whole <= left_ns or (around > left_ns and whole - around <= LATE_SHARE * around):
             fitting.append(work)
     assert chosen is (fitting[0] if fitting else works[-1])
 
 
 def test_a_frame_that_is_late_anyway_is_not_made_coarser_than_it_helps() -> None:
-    """The map alone takes 5,000 of 3,000 ns: 40 new cells at 10 ns are let be, 400 are not."""
+    """The map alone takes 5,000 of 3,000 ns: 250 new cells at 10 ns are let be, 251 are not."""
     speed = Rates(5.0, 0.0, 10.0)
-    few, many, coarse = (Work(Acuity(), True, np.array([cells, 0.0])) for cells in (40.0, 400.0, 20.0))
+    few, many, coarse = (Work(Acuity(), True, np.array([cells, 0.0])) for cells in (250.0, 251.0, 20.0))
     assert choose_acuity([few, coarse], PIXELS, speed, 3000) is few
     assert choose_acuity([many, coarse], PIXELS, speed, 3000) is coarse
-    assert choose_acuity([few._replace(new_map=False), coarse], PIXELS, speed, 399) is coarse
+    assert choose_acuity([few._replace(new_map=False), coarse], PIXELS, speed, 2499) is coarse
 
 
 def test_known_choices() -> None:
