@@ -263,14 +263,18 @@ def test_a_bent_normal_faces_the_ray_and_mirrors_it_off_the_surface(
 
 
 def test_noise_for_a_map_spoils_no_pixel(renderer: Renderer) -> None:
-    """Mirrors and gloss under a map of random codes, deep and grazing: finite, and no mirror ray is lost."""
+    """Mirrors and gloss under a map of random codes, deep and grazing: finite, and no ray is mirrored to the black
+    below the mirror."""
     noise = Texture(np.random.default_rng(3).integers(0, 256, (32, 32, 3), dtype=np.uint8))
     mirror = Material("mirror", BLACK, reflection=WHITE, normal_texture=noise, normal_scale=1000.0)
     even = Surroundings(WHITE, WHITE, WHITE)
     ground = quad((-20, 0, 20), (40, 0, 0), (0, 0, -40), mirror)
-    frame = shoot(renderer, Scene(meshes=(ground,), surroundings=even, camera=Camera((0, 0.5, 9), (0, 0.3, 0))), 64, 36)
-    np.testing.assert_allclose(frame.pixels, 1.0, rtol=1e-6)
-    assert frame.cost.rays.reflection > 64 * 36 // 4
+    below = quad((-900, -1, 900), (1800, 0, 0), (0, 0, -1800), Material("black", BLACK))
+    low = Camera((0, 0.5, 9), (0, 0.3, 0), vertical_fov_deg=20)
+    frame = shoot(renderer, Scene(meshes=(ground, below), surroundings=even, camera=low), 64, 36)
+    onto_mirror = frame.pixels[24:]
+    np.testing.assert_allclose(onto_mirror, 1.0, rtol=1e-6)
+    assert frame.cost.rays.reflection >= 64 * 12
     wild = Material("wild", WHITE, WHITE, 50.0, normal_texture=noise, base="ashikhmin-shirley", exponent_v=3.0)
     ball = Sphere((0, 1, 0), 1.0, dataclasses.replace(wild, transmission=(0.5,) * 3))
     scene = Scene(meshes=(dataclasses.replace(ground, material=wild),), spheres=(ball,), lights=(LAMP,))
