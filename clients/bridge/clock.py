@@ -35,9 +35,6 @@ TICK_SAMPLES = 16
 TICK_SPAN_NS = SECOND_NS // 2
 """How much is looked at before the length of a tick is decided."""
 
-ROUND_TRIPS = 10
-"""How many of the last round trips the service's clock is taken from."""
-
 
 class CaptureTime(NamedTuple):
     """Times of a sample.
@@ -185,28 +182,3 @@ def lower_hull(points: list[tuple[int, int]]) -> list[tuple[int, int]]:
             hull.pop()
         hull.append((x, y))
     return hull
-
-
-class ServiceClock:
-    """The service's monotonic clock against ours, from the quickest of the last round trips."""
-
-    def __init__(self) -> None:
-        self._trips: deque[tuple[int, int]] = deque(maxlen=ROUND_TRIPS)
-
-    def restart(self) -> None:
-        """Forget all: another service may be there now."""
-        self._trips.clear()
-
-    def answered(self, sent_ns: int, service_time_ns: int, received_ns: int) -> None:
-        """Take a round trip into account: sent and received by our clock, answered by the service's."""
-        self._trips.append((received_ns - sent_ns, service_time_ns - (sent_ns + received_ns) // 2))
-
-    @property
-    def round_trip_ns(self) -> int | None:
-        """The least of the last round trips [ns]; None before the first."""
-        return min(self._trips)[0] if self._trips else None
-
-    @property
-    def offset_ns(self) -> int | None:
-        """The service's clock minus ours [ns], right to half the round trip; None before the first."""
-        return min(self._trips)[1] if self._trips else None

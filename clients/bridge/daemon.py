@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from clients.bridge.backoff import Backoff
+from clients.backoff import Backoff
 from clients.bridge.calibration import fit
 from clients.bridge.calibration_walk import CalibrationWalk, WalkState
 from clients.bridge.codec import SECOND_NS, Codec

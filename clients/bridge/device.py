@@ -8,7 +8,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import NamedTuple
 
-from clients.bridge.backoff import Backoff
+from clients.backoff import Backoff
 from clients.bridge.codec import SECOND_NS, Codec
 from clients.bridge.detection import diagnose
 from clients.bridge.device_state import DeviceState, DeviceWatch

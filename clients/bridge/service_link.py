@@ -15,11 +15,11 @@ from urllib.parse import urlencode, urlsplit, urlunsplit
 import websockets
 from websockets.asyncio.client import ClientConnection, connect
 
-from clients.bridge.backoff import Backoff
-from clients.bridge.clock import ServiceClock
+from clients.backoff import Backoff
 from clients.bridge.errors import ConfigError
 from clients.bridge.gaze import Gaze
 from clients.bridge.slot import Slot
+from clients.service_clock import ServiceClock
 from service import protocol
 
 OPEN_TIMEOUT_S = 5.0

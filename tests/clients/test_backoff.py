@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from clients.backoff import FIRST_S, JITTER, LONGEST_S, Backoff
+from clients.backoff import FIRST_S, JITTER, LONGEST_S, PROVEN_NS, Backoff
 
 
 def test_waits_double_up_to_a_limit_and_begin_anew() -> None:
@@ -19,3 +19,15 @@ def test_waits_double_up_to_a_limit_and_begin_anew() -> None:
 @pytest.mark.parametrize(("random", "factor"), [(0.0, 1 - JITTER), (1.0, 1 + JITTER)])
 def test_waits_differ_by_a_share(random: float, factor: float) -> None:
     assert Backoff(lambda: random).wait_s() == pytest.approx(FIRST_S * factor)
+
+
+def test_only_lasting_good_data_makes_the_next_failure_a_new_one() -> None:
+    backoff = Backoff(lambda: 0.5)
+    for _ in range(8):
+        backoff.wait_s()
+    backoff.good(0)
+    backoff.good(PROVEN_NS - 1)
+    assert backoff.wait_s() == LONGEST_S
+    backoff.good(0)
+    backoff.good(PROVEN_NS)
+    assert backoff.wait_s() == FIRST_S

@@ -29,3 +29,18 @@ def test_nothing_is_known_before_the_first_round_trip_and_of_another_service() -
     assert clock.round_trip_ns == 10
     clock.restart()
     assert (clock.offset_ns, clock.round_trip_ns) == (None, None)
+
+
+def test_the_services_clock_is_taken_from_the_quickest_of_the_last_round_trips() -> None:
+    clock = ServiceClock()
+    assert (clock.round_trip_ns, clock.offset_ns) == (None, None)
+    offset = 10**12
+    for i, (there, back) in enumerate([(900, 100), (50, 50), (10, 900)]):
+        sent = i * 10_000
+        clock.answered(sent, sent + there + offset, sent + there + back)
+    assert (clock.round_trip_ns, clock.offset_ns) == (100, offset)
+    for i in range(ROUND_TRIPS):
+        clock.answered(i * 10_000, i * 10_000 + 300 + offset, i * 10_000 + 600)
+    assert (clock.round_trip_ns, clock.offset_ns) == (600, offset)
+    clock.restart()
+    assert clock.offset_ns is None

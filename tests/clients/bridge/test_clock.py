@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from clients.bridge.clock import JUMP_NS, LEAST_SPAN_NS, MOST_DRIFT, DeviceClock, ServiceClock, lower_hull
+from clients.bridge.clock import JUMP_NS, LEAST_SPAN_NS, MOST_DRIFT, DeviceClock, lower_hull
 from clients.bridge.codec import MICROSECOND_NS, MILLISECOND_NS, SECOND_NS
 
 STEP_NS = 4 * MILLISECOND_NS
@@ -146,18 +146,3 @@ def test_the_lower_hull_lies_below_all_points_and_is_convex(heights: list[int]) 
     slopes = np.diff([y for _, y in hull]) / np.diff([x for x, _ in hull])
     assert (np.diff(slopes) > 0).all()
     assert 0 < MOST_DRIFT < 1e-3
-
-
-def test_the_services_clock_is_taken_from_the_quickest_of_the_last_round_trips() -> None:
-    clock = ServiceClock()
-    assert (clock.round_trip_ns, clock.offset_ns) == (None, None)
-    offset = 10**12
-    for i, (there, back) in enumerate([(900, 100), (50, 50), (10, 900)]):
-        sent = i * 10_000
-        clock.answered(sent, sent + there + offset, sent + there + back)
-    assert (clock.round_trip_ns, clock.offset_ns) == (100, offset)
-    for i in range(10):
-        clock.answered(i * 10_000, i * 10_000 + 300 + offset, i * 10_000 + 600)
-    assert (clock.round_trip_ns, clock.offset_ns) == (600, offset)
-    clock.restart()
-    assert clock.offset_ns is None

@@ -16,7 +16,7 @@ from typing import Any
 
 import pytest
 
-from clients.bridge.backoff import Backoff
+from clients.backoff import Backoff
 from clients.bridge.calibration import load_calibration
 from clients.bridge.calibration_walk import NINE_POINTS, CalibrationWalk
 from clients.bridge.config import Config

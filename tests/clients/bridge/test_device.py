@@ -10,8 +10,8 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 
+from clients.backoff import Backoff
 from clients.bridge.asl import Asl
-from clients.bridge.backoff import FIRST_S, JITTER, LONGEST_S, PROVEN_NS, Backoff
 from clients.bridge.clock import DeviceClock
 from clients.bridge.codec import SECOND_NS, Codec
 from clients.bridge.detection import detect, diagnose
@@ -114,20 +114,6 @@ def test_a_diagnosis_says_what_to_change(data: bytes, state: DeviceState, hint: 
     found, why = diagnose(data)
     assert found is state
     assert hint in why
-
-
-def test_waits_double_up_to_a_limit_and_jitter() -> None:
-    middle = Backoff(lambda: 0.5)
-    waits = [middle.wait_s() for _ in range(8)]
-    assert waits == [0.25, 0.5, 1, 2, 4, 5, 5, 5]
-    assert Backoff(lambda: 0.0).wait_s() == pytest.approx(FIRST_S * (1 - JITTER))
-    assert Backoff(lambda: 1.0).wait_s() == pytest.approx(FIRST_S * (1 + JITTER))
-    middle.good(0)
-    middle.good(PROVEN_NS - 1)
-    assert middle.wait_s() == LONGEST_S
-    middle.good(0)
-    middle.good(PROVEN_NS)
-    assert middle.wait_s() == FIRST_S
 
 
 # The thread
