@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import contextlib
 import itertools
 import json
 import os
@@ -13,13 +14,13 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from service.protocol import FrameHeader, unpack_frame
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
+ASK_AGAIN_S = 5
 PATIENCE_S = 60
 
 TEXT, BINARY = 1, 2
@@ -99,32 +100,39 @@ class Page:
         self._commands.close()
         self._events.close()
 
-    def command(self, method: str, **parameters: object) -> dict[str, Any]:
-        """Send a command and return its result."""
+    def command(self, method: str, *, patience_s: float = PATIENCE_S, **parameters: object) -> dict[str, Any]:
+        """Send a command and return its result; `queue.Empty` if there is none in time."""
         number = next(self._ids)
         self._replies[number] = queue.Queue()
         message: dict[str, object] = {"id": number, "method": method, "params": parameters}
         if self._session is not None:
             message["sessionId"] = self._session
         self._commands.write(json.dumps(message).encode() + b"\0")
-        reply = self._replies[number].get(timeout=PATIENCE_S)
+        reply = self._replies[number].get(timeout=patience_s)
         assert "error" not in reply, (method, reply["error"])
         result: dict[str, Any] = reply["result"]
         return result
 
-    def evaluate(self, expression: str) -> Any:
-        """The value of a JavaScript expression."""
-        result = self.command("Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True)
+    def evaluate(self, expression: str, patience_s: float = PATIENCE_S) -> Any:
+        """The value of a JavaScript expression; `queue.Empty` if there is none in time."""
+        result = self.command(
+            "Runtime.evaluate", patience_s=patience_s, expression=expression, returnByValue=True, awaitPromise=True
+        )
         assert "exceptionDetails" not in result, result
         return result["result"].get("value")
 
     def wait_for(self, condition: str) -> Any:
-        """Evaluate a JavaScript expression until it is true, once a drawn picture; its value."""
+        """Evaluate a JavaScript expression until it is true, once a drawn picture; its value.
+
+        A page that is just being left for another one never answers, so each question is asked again after a while.
+        """
         deadline = time.monotonic() + PATIENCE_S
         while time.monotonic() < deadline:
-            value = self.evaluate(f"new Promise((done) => setTimeout(() => done({condition}), 16))")
-            if value:
-                return value
+            with contextlib.suppress(queue.Empty):
+                question = f"new Promise((done) => setTimeout(() => done({condition}), 16))"
+                value = self.evaluate(question, ASK_AGAIN_S)
+                if value:
+                    return value
         raise AssertionError(f"never true: {condition}; the page says: {self.evaluate('document.body.innerText')}")
 
     def point_at(self, x: float, y: float) -> None:
@@ -219,7 +227,7 @@ class Page:
                     self.events.append(message)
 
 
-@contextmanager
+@contextlib.contextmanager
 def browsing(chromium: str, profile: Path) -> Iterator[Page]:
     """A browser with nothing in it, gone in the end."""
     their_commands, our_commands = os.pipe()

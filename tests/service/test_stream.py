@@ -45,7 +45,8 @@ def test_a_still_gaze_ends_with_the_lossless_frame_of_a_render_request(address: 
     with viewer(address) as eye:
         joined = eye.next(Ready)
         assert joined.config is None
-        eye.say(configure(7, "spheres"))
+        display = {**TINY, "distance_cm": 63.5}  # nothing of it is traced yet
+        eye.say(configure(7, "spheres", display=display))
         ready = eye.next(Ready)
         assert (ready.session, ready.config, ready.scene) == (joined.session, 7, "spheres")
         assert {effect.name for effect in ready.effects} >= {"shadows", "reflection", "refraction"}
@@ -62,7 +63,7 @@ def test_a_still_gaze_ends_with_the_lossless_frame_of_a_render_request(address: 
         request = {
             "scene": "spheres",
             "gaze": {"x": 32, "y": 18},
-            "display": TINY,
+            "display": display,
             "quality": {"samples_per_cell": 4, "acuity": {"margin_deg": margin}},
         }
         same = httpx.post(f"{address}/v1/render", json=request, timeout=PATIENCE_S)
