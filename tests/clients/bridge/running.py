@@ -91,7 +91,7 @@ class Listener:
 
     def __init__(self) -> None:
         self.heard = News()
-        self.closes: list[int] = []
+        self.closes = News()
         self.port = 0
         self.display: dict[str, float] | None = DISPLAY
         self._stack = ExitStack()
@@ -130,7 +130,7 @@ class Listener:
                 else:
                     self.heard.add(message)
         except ConnectionClosed as closed:
-            self.closes.append(closed.rcvd.code if closed.rcvd else 0)
+            self.closes.add(closed.rcvd.code if closed.rcvd else 0)
 
 
 @contextmanager

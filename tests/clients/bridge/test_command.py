@@ -56,7 +56,7 @@ def test_a_device_is_emitted_bridged_and_stopped(tmp_path: Path) -> None:
         assert (bridge.returncode, out) == (0, b"")
         events = [json.loads(line) for line in err.splitlines()]
         assert {event["event"] for event in events} >= {"device", "service", "health"}
-        assert service.closes == [1001]
+        assert service.closes.until(list) == [1001]
         tracker.send_signal(signal.SIGTERM)
         tracker.communicate(timeout=PATIENCE_S)
         assert tracker.returncode == 0

@@ -100,7 +100,7 @@ def test_gaze_goes_from_the_line_to_the_service(terminal: Terminal, service: Lis
         assert (gaze.x, gaze.y, gaze.phase, gaze.seq) == (None, None, "blink", 1)
     assert found.result == 0
     assert terminal.read(7) == b"ET_EST\n"
-    assert service.closes == [1001]
+    assert service.closes.until(list) == [1001]
 
 
 def test_the_service_may_come_late_go_and_return(terminal: Terminal) -> None:
