@@ -61,8 +61,8 @@ class WorkerPool:
     def run(self, task: Callable[[int], None], count: int, abandon: threading.Event | None = None) -> None:
         """Call `task(0)` .. `task(count - 1)` on the workers and return when all have finished.
 
-        The first exception of a block stops the blocks not yet begun and is raised here.
-        Must not be called from a block.
+        The first exception of a block stops the blocks not yet begun and is raised here; so does one that reaches
+        the caller while it waits, such as KeyboardInterrupt. Must not be called from a block.
 
         Args:
             task: does one block.
@@ -80,7 +80,15 @@ class WorkerPool:
                 raise RuntimeError("the worker pool is closed")
             self._jobs.append(job)
             self._changed.notify_all()
-        job.done.wait()
+        try:
+            job.done.wait()
+        except BaseException as interruption:  # blocks still running when the process ends would bring it down
+            with self._changed:
+                if job in self._jobs:
+                    self._jobs.remove(job)
+                job.drop(interruption)
+            job.done.wait()
+            raise
         if job.error is not None:
             raise job.error
 

@@ -262,7 +262,7 @@ def render_missing(
             cost = cost_record(rendered, shots[frame], {"encode": milliseconds_since(started_ns)})
             frames.add(frame, picture, cost)
             tick()
-    renderer.close()  # not after Ctrl-C: it waits for the frame in work
+    renderer.close()
 
 
 def assemble(video: Path, frames: FrameFolder, count: int, fps: Fraction, size: tuple[int, int]) -> None:

@@ -115,7 +115,7 @@ def run(arguments: argparse.Namespace) -> int:
         frame = renderer.render(prepared, request)
     render_ms = milliseconds_since(started_ns)
     pixels = draw_overlays(frame.pixels, request, renderer, arguments.overlay)
-    renderer.close()  # not after Ctrl-C: it waits for the frame in work
+    renderer.close()
 
     from renderer.codec import encode
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import threading
 import weakref
 from collections import Counter
@@ -289,3 +290,25 @@ def test_an_idle_worker_holds_on_to_nothing(pool: WorkerPool) -> None:
     pool.run(picture.draw, 10)
     del picture
     assert freed.wait(PATIENCE_S)
+
+
+def test_ctrl_c_waits_for_the_blocks_begun_and_begins_no_other(pool: WorkerPool) -> None:
+    """A block that still ran while the process ends would use what the process has given back."""
+    main = threading.get_ident()
+    begun: list[int] = []
+    ended: list[int] = []
+
+    def interrupt(block: int) -> None:
+        begun.append(block)
+        if block == 0:
+            signal.pthread_kill(main, signal.SIGINT)
+        threading.Event().wait(TURN_S)
+        ended.append(block)
+
+    with pytest.raises(KeyboardInterrupt):
+        pool.run(interrupt, LONG)
+    assert sorted(begun) == sorted(ended)
+    assert len(begun) < LONG
+    again: list[int] = []
+    pool.run(again.append, 3)
+    assert sorted(again) == [0, 1, 2]
