@@ -13,6 +13,7 @@ from dataclasses import MISSING, Field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from clients.bridge.codec import MILLISECOND_NS
 from clients.bridge.config import OF_THE_DEVICE, VARIABLE_PREFIX, Config, of_environment, of_file
 from clients.bridge.errors import ConfigError
 from clients.command_line.errors import OK, UsageError
@@ -70,7 +71,9 @@ def add(commands: argparse._SubParsersAction[Any]) -> None:
     instead.add_argument("--emit", nargs=2, metavar=("PROTOCOL", "PORT"), help=EMIT_HELP)
     parser.add_argument("--calibrate", type=Path, metavar="FILE", help="calibrate first, with targets in the viewer")
     parser.add_argument("--config", type=Path, metavar="FILE", help="a TOML file of settings")
-    parser.add_argument("--json", action="store_true", help="print JSON where a list, a probe or gaze is printed")
+    parser.add_argument(
+        "--json", action="store_true", help="print JSON where a list, a probe, gaze or counts are printed"
+    )
     described = setting_texts(Config)
     settings = parser.add_argument_group("settings")
     for setting in fields(Config):
@@ -100,7 +103,8 @@ def run(arguments: argparse.Namespace) -> int:
     try:
         config, about = settings_of(flags, arguments.config)
         if arguments.emit is not None:
-            return emit(config, *arguments.emit)
+            protocol, target = arguments.emit
+            return emit(config, protocol, target, arguments.json)
         if arguments.probe:
             return show_probe(config, arguments.json)
         return bridge(config, about, arguments)
@@ -224,8 +228,8 @@ def show_probe(config: Config, as_json: bool) -> int:
     return OK
 
 
-def emit(config: Config, protocol: str, target: str) -> int:
-    """Act as a device until stopped."""
+def emit(config: Config, protocol: str, target: str, as_json: bool) -> int:
+    """Act as a device until stopped, and say what became of its records."""
     from dataclasses import replace
 
     from clients.bridge.emitter import emit as send
@@ -243,7 +247,14 @@ def emit(config: Config, protocol: str, target: str) -> int:
         signal.signal(number, lambda *_: stop.set())
     source = records(trace, codec, place_of(config, codec, screen_of(config)), config.rate_hz, config.loop)
     with opened(target, config.baud, lambda text: print(text, flush=True)) as write:
-        send(source, write, stop)
+        told = send(source, write, stop)
+    if as_json:
+        print(json.dumps(told._asdict()))
+    else:
+        print(
+            f"{told.sent:,} records sent, the latest {told.latest_ns / MILLISECOND_NS:.1f} ms after its time; "
+            f"{told.discarded:,} discarded because the reader was too slow, {told.unread:,} while nobody read"
+        )
     return OK
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import signal
 import subprocess
 import threading
@@ -58,8 +59,9 @@ def test_a_device_is_emitted_bridged_and_stopped(tmp_path: Path) -> None:
         assert {event["event"] for event in events} >= {"device", "service", "health"}
         assert service.closes.until(list) == [1001]
         tracker.send_signal(signal.SIGTERM)
-        tracker.communicate(timeout=PATIENCE_S)
+        out, _ = tracker.communicate(timeout=PATIENCE_S)
         assert tracker.returncode == 0
+        assert re.match(rb"\d+ records sent, .* 0 discarded because the reader was too slow, \d+ while nobody", out)
     assert (tmp_path / "run.rec").stat().st_size > 2000
     assert not (tmp_path / "tracker").is_symlink()
 

@@ -226,10 +226,48 @@ def test_an_emitter_is_a_device_that_others_read(kind: str, tmp_path: Path) -> N
     assert not os.path.lexists(tmp_path / "tracker")
 
 
-def test_an_emitter_that_nobody_reads_goes_on(tmp_path: Path) -> None:
+def test_an_emitter_that_nobody_reads_goes_on_and_counts(tmp_path: Path) -> None:
     with opened(str(tmp_path / "tracker"), 115_200, lambda _: None) as write:
-        assert emit(iter([Record(0, b"x" * 100)] * 2000), write, threading.Event()) == 2000
+        told = emit(iter([Record(0, b"x" * 100)] * 2000), write, threading.Event())
+        assert (told.sent, told.discarded, told.unread) == (0, 0, 2000)
         assert stat.S_ISCHR((tmp_path / "tracker").stat().st_mode)
+
+
+@pytest.mark.parametrize("held_up_s", [0.2, 0.8])
+def test_a_reader_that_is_held_up_gets_every_record_whole(tmp_path: Path, held_up_s: float) -> None:
+    """More than a pseudo-terminal holds: 1000 records of 100 bytes, at once."""
+    target, told = str(tmp_path / "tracker"), []
+    lines = [f"{i:098d}\r\n".encode() for i in range(1000)]
+    with opened(target, 115_200, lambda _: None) as write:
+        port = SerialPort(target, 115_200)
+        source = iter([Record(0, line) for line in lines])
+        thread = threading.Thread(target=lambda: told.append(emit(source, write, threading.Event())))
+        thread.start()
+        threading.Event().wait(held_up_s)
+        read = b""
+        while len(read) < 100 * len(lines):
+            chunk = port.read()
+            read += chunk.data if chunk is not None else b""
+        thread.join(PATIENCE_S)
+        port.close()
+    assert read == b"".join(lines)
+    assert (told[0].sent, told[0].discarded, told[0].unread) == (1000, 0, 0)
+    assert told[0].latest_ns > held_up_s * SECOND_NS / 2
+
+
+def test_what_waits_for_too_long_is_discarded_and_counted(tmp_path: Path) -> None:
+    target = str(tmp_path / "tracker")
+    lines = [f"{i:098d}\r\n".encode() for i in range(1000)]
+    with opened(target, 115_200, lambda _: None) as write:
+        port = SerialPort(target, 115_200)
+        told = emit((Record(0, line) for line in lines), write, threading.Event())
+        assert 0 < told.sent < 1000
+        assert (told.sent + told.discarded, told.unread) == (1000, 0)
+        read = b""
+        while (chunk := port.read()) is not None:
+            read += chunk.data
+        port.close()
+    assert read[: 100 * (told.sent - 1)] == b"".join(lines[: told.sent - 1])
 
 
 def test_an_emitter_does_not_take_a_file_or_a_wrong_port(tmp_path: Path) -> None:
@@ -246,5 +284,5 @@ def test_an_emitter_writes_to_a_port_of_pyserial() -> None:
         with opened(url, 115_200, lambda _: None) as write:
             peer, _ = listener.accept()
             with peer:
-                emit(iter([Record(0, b"hello")]), write, threading.Event())
+                assert emit(iter([Record(0, b"hello")]), write, threading.Event()).sent == 1
                 assert peer.recv(5) == b"hello"
