@@ -193,7 +193,12 @@ def _see_rectangle(light: Any, px: float, py: float, pz: float) -> LightView:
     low, high = y0 / math.hypot(y0, z), y1 / math.hypot(y1, z)
     turn = 2.0 * math.pi - math.acos(high * left) - math.acos(-left * low)
     solid_angle = math.acos(low * right) + math.acos(-right * high) - turn
-    return LightView(max(0.0, solid_angle), x0, x1, y0, y1, z, turn, -low, high)
+    if solid_angle < SMALLEST_SPHERICAL:
+        # The difference may have rounded to nothing. Its area is sampled: that it is seen is all that counts.
+        x, y = 0.5 * (x0 + x1), 0.5 * (y0 + y1)
+        square = x * x + y * y + z * z
+        solid_angle = min(0.5 * SMALLEST_SPHERICAL, light.width * light.height * abs(z) / (square * math.sqrt(square)))
+    return LightView(solid_angle, x0, x1, y0, y1, z, turn, -low, high)
 
 
 @formula

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import math
 
@@ -15,7 +16,7 @@ from renderer.gaze import Gaze
 from renderer.pipeline import Renderer
 from renderer.prepared import PreparedScene, prepare
 from renderer.quality import Quality
-from renderer.scene import Material, Mesh, PointLight, Rgb, Scene, Surroundings
+from renderer.scene import Material, Mesh, PointLight, Rgb, Scene, Sphere, Surroundings, Texture
 
 BLACK: Rgb = (0.0, 0.0, 0.0)
 WHITE: Rgb = (1.0, 1.0, 1.0)
@@ -123,10 +124,17 @@ def shoot(
     linear: bool = True,
     camera: Camera | None = None,
     antialiasing: str = "stochastic",
+    shadow_samples: int = 4,
 ) -> Frame:
     """A frame with the gaze in the middle of a 50 cm wide screen of square pixels."""
     prepared = prepare(scene) if isinstance(scene, Scene) else scene
-    quality = Quality(map=tiling, samples_per_cell=samples, max_depth=depth, antialiasing=antialiasing)
+    quality = Quality(
+        map=tiling,
+        samples_per_cell=samples,
+        max_depth=depth,
+        antialiasing=antialiasing,
+        shadow_samples=shadow_samples,
+    )
     return renderer.render(
         prepared, FrameRequest(Gaze(width / 2, height / 2), Display(width, height), camera, quality, linear)
     )
@@ -141,3 +149,20 @@ def aim(position: Rgb, look_at: Rgb) -> Camera:
     """A camera whose only interesting ray is the middle one."""
     along = np.subtract(look_at, position)
     return Camera(position, look_at, (0.0, 0.0, -1.0) if not along[0] and not along[2] else (0.0, 1.0, 0.0), 1.0)
+
+
+DOWN = aim((0, 3, 0), (0, 0, 0))
+"""Looks straight down at the origin from 3 m."""
+
+
+def glass_and_mirror() -> Scene:
+    """A ball of glass and one of mirror on a checkered floor under two lights."""
+    checks = Texture(np.uint8([[[230] * 3, [30] * 3], [[30] * 3, [230] * 3]]))
+    ground = floor(Material("tiles", diffuse_texture=checks), -1.0)
+    return Scene(
+        meshes=(dataclasses.replace(ground, uvs=ground.uvs * 5 if ground.uvs is not None else None),),
+        spheres=(Sphere((-1, 0, 0), 1.0, glass()), Sphere((1, 0, -0.5), 1.0, mirror(0.8))),
+        lights=(light(3, 5, 4, 90.0), light(-4, 3, 2, 40.0)),
+        surroundings=Surroundings((0.3, 0.5, 0.9), (0.7, 0.7, 0.7), (0.05, 0.05, 0.05)),
+        camera=Camera((0, 1, 7), (0, 0, 0)),
+    )

@@ -184,19 +184,6 @@ def test_a_highlight_of_a_rectangle_is_the_mean_of_those_of_its_points(renderer:
     assert_agrees(expose(renderer, scene, 64, 64), truth, 0.01)
 
 
-@pytest.mark.parametrize("size", [1e-2, 1e-4, 3e-6])
-def test_a_tiny_light_is_a_point_light_of_the_same_power(renderer: Renderer, size: float) -> None:
-    """To the square of its size over its distance, and its place to the size."""
-    point = expose(renderer, Scene(meshes=(floor(WHITE_LAMBERT),), lights=(light(1, 2, 0, 5.0),), camera=DOWN))
-    corner, across = (1 - size, 2 + size / 2, -size / 2), 5.0 / (size * size * math.sqrt(5))
-    for lamp in (
-        ball(1, 2, 0, size, 5.0 / (math.pi * size**2)),
-        RectangleLight(corner, (2 * size, -size, 0), (0, 0, size), (across,) * 3),
-    ):
-        frame = expose(renderer, Scene(meshes=(floor(WHITE_LAMBERT),), lights=(lamp,), camera=DOWN))
-        np.testing.assert_allclose(frame.pixels, point.pixels, rtol=3 * size + 16 * U)
-
-
 # soft shadows
 
 WIDTH, LIGHT_HEIGHT, EDGE_HEIGHT = 0.5, 2.0, 0.8

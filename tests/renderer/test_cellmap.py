@@ -17,17 +17,19 @@ from renderer.cellmap import CellMap, build_cell_map, cell_sizes
 from renderer.display import Display
 from renderer.gaze import Gaze, GazeBucket, bucket_of
 from renderer.pipeline import Renderer
-from renderer.quality import MAPS, MAX_BUCKET_PX, Quality
+from renderer.quality import MAPS, Quality
 from renderer.workers import WorkerPool
-from tests.renderer.viewing import PAPER_ACUITY, PAPER_SCREEN, acuities, displays, gazes, true_cell_size
-
-SIDES = sorted({1, *(2**power for power in range(1, 16)), *(3 * 2**power for power in range(15))})
-"""Sides an aligned cell can have [px]."""
-
-ROUNDING = 1e-6
-"""How far above alpha / beta a side may be, relative."""
-
-MARGINS = st.just(0.0) | st.floats(0, 90)
+from tests.renderer.viewing import (
+    MARGINS,
+    PAPER_ACUITY,
+    PAPER_SCREEN,
+    ROUNDING,
+    SIDES,
+    acuities,
+    displays,
+    gazes,
+    true_cell_size,
+)
 
 
 @pytest.fixture(scope="module")
@@ -47,19 +49,6 @@ def fresh() -> Iterator[Renderer]:
 def identities(cells: CellMap) -> NDArray[np.int64]:
     """(n,) int64, one number for each (side, column, row)."""
     return (cells.side.astype(np.int64) * 65_536 + cells.x) * 65_536 + cells.y
-
-
-def pixels_of_each(cells: CellMap) -> NDArray[np.int64]:
-    """(n,) int64; fails if a label of the mask is no cell."""
-    counts = np.bincount(cells.mask.ravel(), minlength=cells.cells)
-    assert cells.mask.min() >= 0
-    assert len(counts) == cells.cells
-    return counts
-
-
-def full_widths(cells: CellMap) -> NDArray[np.int32]:
-    """(h, w) int32: the side of each pixel's cell [px]."""
-    return cells.side[cells.mask]
 
 
 def aligned_by_hand(sizes: NDArray[np.uint16]) -> set[tuple[int, int, int]]:
@@ -131,59 +120,6 @@ def test_a_move_of_the_gaze_renews_few_aligned_cells(move_px: int, new_share: fl
 # A partition of the screen
 
 
-@given(data=st.data(), acuity=acuities(MARGINS), bucket_px=st.sampled_from([0, 1, 16, 100, MAX_BUCKET_PX]))
-def test_aligned_cells_tile_the_screen_with_squares_on_multiples_of_their_sides(
-    data: st.DataObject, acuity: Acuity, bucket_px: int, pool: WorkerPool
-) -> None:
-    display = data.draw(displays())
-    bucket = bucket_of(data.draw(gazes(display)), bucket_px)
-    cells = build_cell_map("aligned", display, acuity, bucket, pool)
-    assert (cells.kind, cells.bucket) == ("aligned", bucket)
-    assert cells.mask.shape == (display.height_px, display.width_px)
-    assert set(cells.side.tolist()) <= set(SIDES)
-    assert not (cells.x % cells.side).any()
-    assert not (cells.y % cells.side).any()
-    assert cells.x.min() >= 0
-    assert cells.y.min() >= 0
-    assert (cells.x + cells.side).max() <= display.width_px
-    assert (cells.y + cells.side).max() <= display.height_px
-    assert_array_equal(pixels_of_each(cells), cells.side.astype(np.int64) ** 2)
-    rows, columns = np.indices(cells.mask.shape)
-    assert_array_equal(columns - columns % full_widths(cells), cells.x[cells.mask])
-    assert_array_equal(rows - rows % full_widths(cells), cells.y[cells.mask])
-
-
-@given(data=st.data(), acuity=acuities(MARGINS), bucket_px=st.sampled_from([0, 16]))
-def test_scanline_cells_share_the_screen_out(
-    data: st.DataObject, acuity: Acuity, bucket_px: int, pool: WorkerPool
-) -> None:
-    display = data.draw(displays())
-    bucket = bucket_of(data.draw(gazes(display)), bucket_px)
-    cells = build_cell_map("scanline", display, acuity, bucket, pool)
-    assert (cells.kind, cells.bucket) == ("scanline", bucket)
-    owned = pixels_of_each(cells)
-    assert owned.min() >= 1
-    assert (owned <= cells.side.astype(np.int64) ** 2).all()
-    assert_array_equal(cells.mask[cells.y, cells.x], np.arange(cells.cells))
-    rows, columns = np.indices(cells.mask.shape)
-    right, down = columns - cells.x[cells.mask], rows - cells.y[cells.mask]
-    assert min(right.min(), down.min()) >= 0
-    assert (np.maximum(right, down) < full_widths(cells)).all()
-
-
-@given(data=st.data())
-def test_a_full_map_has_a_cell_for_each_pixel(data: st.DataObject, pool: WorkerPool) -> None:
-    display = data.draw(displays())
-    bucket = bucket_of(data.draw(gazes(display)), 16)
-    cells = build_cell_map("full", display, Acuity(), bucket, pool)
-    assert cells.cells == display.pixels
-    assert (cells.side == 1).all()
-    rows, columns = np.indices(cells.mask.shape)
-    assert_array_equal(cells.x[cells.mask], columns)
-    assert_array_equal(cells.y[cells.mask], rows)
-    assert_array_equal(pixels_of_each(cells), 1)
-
-
 @given(data=st.data(), acuity=acuities(MARGINS), bucket_px=st.sampled_from([0, 16]))
 def test_both_tilings_are_what_their_definitions_say(
     data: st.DataObject, acuity: Acuity, bucket_px: int, pool: WorkerPool
@@ -201,19 +137,6 @@ def test_both_tilings_are_what_their_definitions_say(
 
 
 # What the eye allows
-
-
-@given(data=st.data(), acuity=acuities(), bucket_px=st.sampled_from([0, 1, 16, 100, MAX_BUCKET_PX]))
-def test_no_aligned_cell_is_coarser_than_any_gaze_of_its_bucket_allows_at_any_of_its_pixels(
-    data: st.DataObject, acuity: Acuity, bucket_px: int, pool: WorkerPool
-) -> None:
-    display = data.draw(displays(150, 150))
-    bucket = bucket_of(data.draw(gazes(display)), bucket_px)
-    cells = build_cell_map("aligned", display, acuity, bucket, pool)
-    part = st.sampled_from([-0.5, 0.5]) | st.floats(-0.5, 0.5)
-    gaze = Gaze(bucket.x + data.draw(part) * bucket_px, bucket.y + data.draw(part) * bucket_px)
-    allowed = true_cell_size(display, acuity, gaze)
-    assert (full_widths(cells) <= allowed * (1 + ROUNDING)).all(), gaze
 
 
 @given(data=st.data(), acuity=acuities())
@@ -235,14 +158,6 @@ def test_where_nothing_is_left_out_the_foveated_map_is_the_full_one(pool: Worker
         cells = build_cell_map(kind, display, Acuity(), bucket, pool)
         assert (cells.side == 1).all()
         assert set(identities(cells)) == set(identities(full))
-
-
-@pytest.mark.parametrize("gaze", [Gaze(-5000.0, 540.0), Gaze(1e9, 1e9), Gaze(-1e30, 1e30)])
-def test_a_gaze_off_the_screen_has_a_coarse_map(gaze: Gaze, pool: WorkerPool) -> None:
-    beside = build_cell_map("aligned", PAPER_SCREEN, Acuity(), bucket_of(gaze, 16), pool)
-    middle = build_cell_map("aligned", PAPER_SCREEN, Acuity(), bucket_of(Gaze(960.0, 540.0), 16), pool)
-    assert 1 <= beside.cells < middle.cells / 5
-    assert pixels_of_each(beside).sum() == PAPER_SCREEN.pixels
 
 
 def test_from_far_away_there_are_as_few_cells_as_the_tilings_allow(pool: WorkerPool) -> None:
@@ -282,19 +197,6 @@ def test_a_map_is_int32_and_read_only(kind: str, pool: WorkerPool) -> None:
             array[...] = 0
     assert cells.x.shape == cells.y.shape == cells.side.shape == (cells.cells,)
     assert cells.nbytes == 4 * (3 * cells.cells + 64 * 48)
-
-
-def test_gazes_of_a_bucket_share_the_map_and_others_do_not(fresh: Renderer) -> None:
-    display, quality = Display(160, 90), Quality()
-    first, cached = fresh.cell_map(display, quality, Gaze(8.0, 8.0))
-    assert not cached
-    for x, y in [(23.9, 8.0), (8.0, 23.9), (16.0, 16.0)]:
-        again, cached = fresh.cell_map(display, quality, Gaze(x, y))
-        assert cached
-        assert again is first
-    assert not fresh.cell_map(display, quality, Gaze(24.0, 8.0))[1]
-    assert not fresh.cell_map(display, quality, Gaze(8.0, np.nextafter(8.0, 0.0)))[1]
-    assert (fresh.map_cache.hits, fresh.map_cache.misses) == (3, 3)
 
 
 def test_every_setting_that_shapes_the_map_is_part_of_its_key(fresh: Renderer) -> None:

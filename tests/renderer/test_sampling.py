@@ -10,46 +10,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from renderer.camera import Camera, ViewFrame
-from renderer.pipeline import Renderer
 from renderer.rays import make_rays
-from renderer.sampling import camera_rays, lattice_order, lattice_step
-from renderer.scene import Scene
-from tests.renderer.drawing import lamp, quad, shoot
-
-SCREEN_PX = 32_768
-PIXEL_VIEW = ViewFrame(np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]))
-"""A view whose ray through the pixel point (x, y) is (x, y, 1)."""
+from renderer.sampling import camera_rays, lattice_step
+from tests.renderer.cell_point import PIXEL_VIEW, SCREEN_PX, places
 
 CHI_SQUARE_63 = 131.7
 """Exceeded by uniform numbers in 64 bins once in a million tests (Wilson and Hilferty)."""
-
-
-def places(
-    cells: list[tuple[int, int, int]],
-    samples: int,
-    *,
-    first: int = 0,
-    regular: bool = False,
-    points: int | None = None,
-    screen: tuple[int, int] = (SCREEN_PX, SCREEN_PX),
-) -> NDArray[np.float64]:
-    """(cells, samples, 2) places of the camera rays of (x, y, side) cells, in pixels from the cell's corner.
-
-    Of samples first .. first + samples - 1 of `points`, or of no more than that.
-    """
-    x, y, side = (np.array(column, dtype=np.int32) for column in zip(*cells, strict=True))
-    rays = make_rays(len(cells) * samples)
-    shifted = PIXEL_VIEW._replace(corner=np.array([-float(x[0]), -float(y[0]), 1.0]))
-    points = first + samples if points is None else points
-    step, order = lattice_step(points) if regular else 0, lattice_order(points)
-    chosen = np.arange(len(cells), dtype=np.int32)
-    since, until = np.full_like(chosen, first), np.full_like(chosen, first + samples)
-    origin = np.zeros(3, np.float32)
-    camera_rays(shifted, origin, *screen, x, y, side, chosen, since, until, points, step, order, rays)
-    direction = rays.direction.astype(np.float64).reshape(len(cells), samples, 3)
-    corner = np.stack([x - x[0], y - y[0]], axis=1)[:, None]
-    return direction[..., :2] / direction[..., 2:] - corner
 
 
 def chi_square(u: NDArray[np.float64], v: NDArray[np.float64]) -> float:
@@ -168,28 +134,6 @@ def test_cells_of_one_call_may_be_sampled_from_different_samples_on() -> None:
     seen = rays.direction[:, :2] / rays.direction[:, 2:]
     np.testing.assert_allclose(seen, places([(0, 0, 4)], 9)[0, [2, 3, 4, 7, 8]], rtol=1e-5)
     assert rays.sample.tolist() == [0, 1, 2, 3, 4]
-
-
-def test_h51_the_error_of_an_edge_falls_with_the_root_of_the_samples() -> None:
-    """An edge covers 0.3 of each of 4,096 cells; n from 4 to 1,024."""
-    covered = places([(x, y, 1) for y in range(64) for x in range(64)], 1024)[..., 0] % 1.0 < 0.3
-    counts = np.array([4, 16, 64, 256, 1024])
-    errors = [math.sqrt(((covered[:, :n].mean(axis=1) - 0.3) ** 2).mean()) for n in counts]
-    slope = np.polyfit(np.log(counts), np.log(errors), 1)[0]
-    assert slope == pytest.approx(-0.5, abs=0.05)
-
-
-def test_h51_an_edge_through_pixels_has_the_right_mean(renderer: Renderer) -> None:
-    """2,048 pixels of which 0.3 is bright: each within 5.5 and their mean within 4 standard errors."""
-    pixels, samples, share = 2048, 256, 0.3
-    camera = Camera((0, 0, 1), (0, 0, 0), vertical_fov_deg=90)
-    width = 2.0 / pixels
-    scene = Scene(meshes=(quad((-1, -1, 0), (1 - width / 2 + share * width, 0, 0), (0, 2, 0), lamp()),), camera=camera)
-    seen = shoot(renderer, scene, 1, pixels, samples=samples).pixels[..., 0].ravel()
-    variance = share * (1 - share)
-    z = (seen - share) * math.sqrt(samples / variance)
-    assert np.abs(z).max() < 5.5
-    assert abs(z.mean()) * math.sqrt(pixels) < 4.0
 
 
 def test_a_lattice_of_one_or_two_points_exists() -> None:

@@ -15,7 +15,6 @@ from renderer.gaze import Gaze
 from renderer.pipeline import Renderer
 from renderer.quality import Quality
 from renderer.store import (
-    BRIGHTEST,
     CHUNK_CELLS,
     LUMINANCE,
     SampleStore,
@@ -157,33 +156,6 @@ def test_what_is_missing_is_found_in_parts_and_in_order(pool: WorkerPool) -> Non
     np.testing.assert_array_equal(found.cells, np.flatnonzero(number < 3))
     np.testing.assert_array_equal(found.first, number[number < 3])
     assert (found.held, found.fewest) == (number.sum(), 0)
-
-
-@pytest.mark.parametrize("bad", [np.nan, -1e-9, -np.inf])
-@pytest.mark.parametrize("channel", [0, 1, 2])
-def test_h50_a_sample_that_is_no_light_counts_as_black_and_is_counted(bad: float, channel: int) -> None:
-    radiance = np.ones((4, 3), np.float32)
-    radiance[2, channel] = bad
-    store = SampleStore(1)
-    assert (
-        add_samples(
-            store.samples, store.spread, np.array([0]), np.array([0], np.int32), np.array([4], np.int32), radiance
-        )
-        == 1
-    )
-    np.testing.assert_array_equal(store.samples.total[0], 3.0)
-    assert store.samples.number[0] == 4
-    assert np.isfinite(store.samples.square).all()
-
-
-@pytest.mark.parametrize("huge", [np.inf, 3.4e38, 1e30, 1e17])
-def test_h50_endless_light_is_cut_where_its_squares_still_fit(huge: float) -> None:
-    radiance = np.full((4096, 3), huge, np.float32)
-    store = SampleStore(1)
-    all_of_them = np.array([4096], np.int32)
-    assert add_samples(store.samples, store.spread, np.array([0]), np.array([0], np.int32), all_of_them, radiance) == 0
-    np.testing.assert_allclose(store.samples.total[0] / 4096, BRIGHTEST, rtol=1e-3)
-    assert np.isfinite(store.samples.square[0])
 
 
 def test_a_store_states_its_size() -> None:

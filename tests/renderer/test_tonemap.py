@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numba
 import numpy as np
-import pytest
 from numpy.typing import NDArray
 
 from renderer.texture import srgb_to_linear
 from renderer.tonemap import FIRST_CODES, THRESHOLDS, encode_srgb, srgb_code
+from tests.renderer.texel import srgb_of
 
 
 @numba.njit
@@ -19,20 +19,6 @@ def kernel_codes(
     for index in range(len(values)):
         codes[index] = srgb_code(values[index], thresholds, first_codes)
     return codes
-
-
-def srgb_of(linear: float) -> float:
-    """IEC 61966-2-1, 0 to 1."""
-    return 12.92 * linear if linear <= 0.0031308 else 1.055 * linear ** (1 / 2.4) - 0.055
-
-
-@pytest.mark.parametrize(
-    ("linear", "coded"), [(0.0031308, 0.04044994), (0.5, 0.73535698), (0.0, 0.0), (1.0, 1.0), (0.18, 0.46135613)]
-)
-def test_h49_values_of_the_standard(linear: float, coded: float) -> None:
-    assert srgb_of(linear) == pytest.approx(coded, abs=1e-7)
-    assert int(encode_srgb(np.array([linear]))[0]) == round(255 * coded)
-    assert float(srgb_to_linear(np.array([coded]))[0]) == pytest.approx(linear, abs=1e-7)
 
 
 def test_a_code_is_the_rounded_curve_everywhere() -> None:
@@ -50,16 +36,6 @@ def test_every_code_survives_the_way_to_linear_light_and_back() -> None:
 def test_codes_are_of_any_shape() -> None:
     assert encode_srgb(np.zeros((3, 4, 3), np.float32)).shape == (3, 4, 3)
     assert encode_srgb(np.zeros((0, 3))).shape == (0, 3)
-
-
-def test_h49_extremes() -> None:
-    values = np.float32([0, -0.0, 1e-45, 1e-30, -1, -np.inf, np.nan, 1, 1.0000001, 300, 1e30, 3.4e38, np.inf])
-    np.testing.assert_array_equal(encode_srgb(values), [0, 0, 0, 0, 0, 0, 0, 255, 255, 255, 255, 255, 255])
-
-
-def test_h49_brighter_is_never_darker() -> None:
-    values = np.sort(np.exp(np.random.default_rng(1).uniform(-12, 3, 100_000))).astype(np.float32)
-    assert (np.diff(encode_srgb(values).astype(int)) >= 0).all()
 
 
 def test_the_kernel_is_the_plain_search() -> None:

@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from renderer.acuity import ECCENTRICITIES, MODELS, Acuity
+from renderer.cellmap import CellMap, cell_sizes
 from renderer.display import Display
-from renderer.gaze import Gaze
+from renderer.gaze import Gaze, GazeBucket
 
 PAPER_SCREEN = Display(1920, 1080, 50.0, 35.0, 60.0)
 PAPER_ACUITY = Acuity(eccentricity="paper")
@@ -108,3 +109,31 @@ def true_cell_size(display: Display, acuity: Acuity, gaze: Gaze) -> NDArray[np.f
     angle = np.maximum(0, true_eccentricity(display, gaze, acuity.eccentricity) - acuity.margin_deg)
     alpha = acuity.scale / (2 * CUT_OFF_CPD[acuity.model](angle))
     return np.clip(alpha / beta, 1, max(display.width_px, display.height_px))
+
+
+ROUNDING = 1e-6
+"""How near alpha / beta may be to an integer for either of its neighbours to be right."""
+
+
+def sizes_at(display: Display, acuity: Acuity, gaze: Gaze) -> NDArray[np.uint16]:
+    return cell_sizes(display, acuity, GazeBucket(gaze.x, gaze.y, 0))
+
+
+SIDES = sorted({1, *(2**power for power in range(1, 16)), *(3 * 2**power for power in range(15))})
+"""Sides an aligned cell can have [px]."""
+
+
+MARGINS = st.just(0.0) | st.floats(0, 90)
+
+
+def pixels_of_each(cells: CellMap) -> NDArray[np.int64]:
+    """(n,) int64; fails if a label of the mask is no cell."""
+    counts = np.bincount(cells.mask.ravel(), minlength=cells.cells)
+    assert cells.mask.min() >= 0
+    assert len(counts) == cells.cells
+    return counts
+
+
+def full_widths(cells: CellMap) -> NDArray[np.int32]:
+    """(h, w) int32: the side of each pixel's cell [px]."""
+    return cells.side[cells.mask]
