@@ -33,6 +33,7 @@ class Codec(ABC):
     Attributes:
         name: as the command line calls it.
         unit: of the points: `px`, `fraction`, `deg`, `asl` (260x240) or `raw`.
+        origin: where (0, 0) is: `top-left`, `bottom-left` or `center`.
         binocular: whether samples hold the two eyes apart.
         ticks_ns: how long a tick of the device's clock may be; several where only the rate of arrival can tell.
         wrap: ticks after which the device's clock starts from 0 again; None if it does not.
@@ -42,6 +43,7 @@ class Codec(ABC):
 
     name: ClassVar[str]
     unit: str = "px"
+    origin: ClassVar[str] = "top-left"
     binocular: ClassVar[bool] = False
     ticks_ns: tuple[float, ...] = ()
     wrap: int | None = None

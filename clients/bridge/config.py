@@ -13,6 +13,7 @@ from typing import Any
 from clients.bridge.calibration import Model
 from clients.bridge.codec import MICROSECOND_NS, MILLISECOND_NS, SECOND_NS
 from clients.bridge.errors import ConfigError
+from clients.bridge.fields import LEAST_CONFIDENCE
 from clients.bridge.gaze import PAD_MS
 from clients.bridge.pattern_lines import DEFAULT_PATTERN
 from clients.bridge.sample import Eye
@@ -22,7 +23,7 @@ from clients.bridge.smi import DEFAULT_FORMAT
 VARIABLE_PREFIX = "GAZETRACE_BRIDGE_"
 OF_THE_DEVICE = (
     "protocol", "baud", "unit", "origin", "eye", "time_unit", "smi_format", "asl_counted", "iscan_parameters",
-    "iscan_columns", "fields", "paths", "pattern",
+    "iscan_columns", "fields", "paths", "pattern", "surface", "least_confidence",
 )  # fmt: skip
 """Settings that say what a device's bytes mean: a recording keeps them."""
 
@@ -37,15 +38,15 @@ class Config:
     """Every setting of the bridge; `GAZETRACE_BRIDGE_PORT` in the environment sets `port`, and so on.
 
     Attributes:
-        port: the device: `/dev/serial/by-id/...`, `socket://host:port`, `rfc2217://host:port`, `hwgrep://REGEX`.
-        protocol: what it speaks: smi, asl, iscan, iscan-ascii, gazepoint, eyetribe, csv, jsonl or regex.
+        port: the device: `/dev/serial/by-id/...`, `socket://host:port`, `rfc2217://host:port`, `hwgrep://REGEX`, `lsl://`.
+        protocol: what it speaks: smi, asl, iscan, iscan-ascii, gazepoint, eyetribe, csv, jsonl, regex, lsl or pupil.
         baud: bits a second on its line.
         no_dtr: True to leave DTR and RTS low: boards that restart on DTR stay up.
         service: the service's address.
         session: the session that gaze goes to.
         token: the service's token; None for GAZETRACE_TOKEN, if that is set.
         unit: what the device's numbers count: px, fraction, deg, asl or raw; None for what its protocol says.
-        origin: where the device's (0, 0) is: top-left, bottom-left or center.
+        origin: where the device's (0, 0) is: top-left, bottom-left or center; None for what its protocol says.
         eye: whose gaze counts: best, left, right or average.
         screen_px: the screen's pixels, such as 1920x1080; None for those of the session's display.
         screen_cm: its size [cm], such as 50x35; None for that of the session's display.
@@ -65,9 +66,11 @@ class Config:
         iscan_columns: which of them, from 0, are the gaze.
         iscan_start: the byte that starts ISCAN.
         iscan_stop: the byte that stops ISCAN.
-        fields: what the numbers of a csv line are: x, y, t (time), v (validity), xl, yl, xr, yr, or -.
-        paths: where the fields of a jsonl record stand, such as x=gaze.0,y=gaze.1.
+        fields: what the numbers of a csv line are: x, y, t (time), v (validity), c (confidence), xl, yl, xr, yr, or -.
+        paths: where the fields of a jsonl record stand, such as x=gaze.0,y=gaze.1; for lsl, the channels' labels.
         pattern: a regular expression whose groups name the fields.
+        surface: what the screen is called as a surface in Pupil Capture; None for gaze in the scene camera's picture.
+        least_confidence: of a device that states one, 0 to 1; below it the eye counts as lost.
         record: file to keep every byte in.
         replay: a recording to play instead of a port.
         trace: CSV file of gaze to play instead of a port.
@@ -88,7 +91,7 @@ class Config:
     session: str = "main"
     token: str | None = field(default=None, repr=False)
     unit: Unit | None = None
-    origin: Origin = Origin.TOP_LEFT
+    origin: Origin | None = None
     eye: Eye = Eye.BEST
     screen_px: tuple[float, float] | None = None
     screen_cm: tuple[float, float] | None = None
@@ -111,6 +114,8 @@ class Config:
     fields: tuple[str, ...] = ("x", "y")
     paths: Mapping[str, str] = field(default_factory=dict)
     pattern: str = DEFAULT_PATTERN
+    surface: str | None = None
+    least_confidence: float = LEAST_CONFIDENCE
     record: Path | None = None
     replay: Path | None = None
     trace: Path | None = None
@@ -133,6 +138,8 @@ class Config:
             value = getattr(self, name)
             if not (math.isfinite(value) and 0 <= value <= 10_000):
                 raise ConfigError(name, "0 to 10000", value)
+        if not 0 <= self.least_confidence <= 1:
+            raise ConfigError("least_confidence", "0 to 1", self.least_confidence)
         for name in ("screen_px", "screen_cm"):
             size = getattr(self, name)
             if size is not None and not all(math.isfinite(side) and side > 0 for side in size):
@@ -256,11 +263,21 @@ def _choice(kind: Callable[[str], Any], names: tuple[str, ...]) -> Callable[[str
 
 
 _READ: Mapping[str, Callable[[str, str], Any]] = {
-    **dict.fromkeys(("port", "protocol", "service", "session", "token", "smi_format", "pattern"), _text),
+    **dict.fromkeys(("port", "protocol", "service", "session", "token", "smi_format", "pattern", "surface"), _text),
     **dict.fromkeys(("calibration", "record", "replay", "trace", "status_file"), _path),
     **dict.fromkeys(("baud", "poll_byte", "iscan_parameters", "iscan_start", "iscan_stop"), _integer),
     **dict.fromkeys(
-        ("distance_cm", "device_latency_ms", "saccade_deg_s", "pad_ms", "max_rate_hz", "speed", "rate_hz"), _number
+        (
+            "distance_cm",
+            "device_latency_ms",
+            "saccade_deg_s",
+            "pad_ms",
+            "max_rate_hz",
+            "speed",
+            "rate_hz",
+            "least_confidence",
+        ),
+        _number,
     ),
     **dict.fromkeys(("no_dtr", "smooth", "asl_counted", "simulate", "loop", "fail_fast", "log_json"), _switch),
     **dict.fromkeys(("screen_px", "screen_cm"), _size),

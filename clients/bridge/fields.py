@@ -7,15 +7,17 @@ import math
 from clients.bridge.codec import BadRecord, Line, number
 from clients.bridge.sample import Point, Sample, seen
 
-KNOWN_FIELDS = frozenset(("x", "y", "t", "v", "xl", "yl", "xr", "yr"))
+KNOWN_FIELDS = frozenset(("x", "y", "t", "v", "c", "xl", "yl", "xr", "yr"))
+LEAST_CONFIDENCE = 0.6
+"""Pupil Labs' documentation calls data below it not useful; other devices give no number."""
 NO_VALUE = frozenset(("", "nan", "null", "none", "na", "."))
 """How devices write that an eye is lost, in lower case."""
 FALSE = frozenset(("0", "0.0", "false"))
 TRUE = frozenset(("1", "1.0", "true"))
 
 
-def sample_of(line: Line, fields: dict[str, str]) -> Sample:
-    """The sample of named fields; `v` is the validity of all of them.
+def sample_of(line: Line, fields: dict[str, str], least_confidence: float = LEAST_CONFIDENCE) -> Sample:
+    """The sample of named fields; `v` is the validity of all of them, `c` the confidence in them, 0 to 1.
 
     Raises:
         BadRecord: for a field that is no number.
@@ -26,6 +28,8 @@ def sample_of(line: Line, fields: dict[str, str]) -> Sample:
         if word not in TRUE | FALSE:
             raise BadRecord(word)
         valid = word in TRUE
+    if "c" in fields:
+        valid = valid and _coordinate(fields["c"]) >= least_confidence
     ticks = number(fields["t"]) if "t" in fields else None
     both, left, right = (_point(fields, suffix, valid) for suffix in ("", "l", "r"))
     return Sample(line.first, line.size, ticks, left, right, both)

@@ -13,9 +13,13 @@ from clients.bridge.eyetribe import EyeTribe
 from clients.bridge.gazepoint import Gazepoint
 from clients.bridge.iscan import IscanAscii, IscanBinary
 from clients.bridge.json_lines import JsonLines
+from clients.bridge.lsl import SCHEME as LSL_SCHEME
+from clients.bridge.lsl import Lsl
 from clients.bridge.pattern_lines import PatternLines
+from clients.bridge.pupil import SCHEME as PUPIL_SCHEME
+from clients.bridge.pupil import Pupil
 from clients.bridge.sample import Eye
-from clients.bridge.screen import Unit
+from clients.bridge.screen import Origin, Unit
 from clients.bridge.smi import Smi
 
 PROTOCOLS: dict[str, Callable[[Config], Codec]] = {
@@ -29,10 +33,16 @@ PROTOCOLS: dict[str, Callable[[Config], Codec]] = {
     ),
     "gazepoint": lambda _: Gazepoint(),
     "eyetribe": lambda _: EyeTribe(),
-    "csv": lambda config: CsvLines(config.fields),
-    "jsonl": lambda config: JsonLines(config.paths or None),
-    "regex": lambda config: PatternLines(config.pattern),
+    "csv": lambda config: CsvLines(config.fields, config.least_confidence),
+    "jsonl": lambda config: JsonLines(config.paths or None, config.least_confidence),
+    "regex": lambda config: PatternLines(config.pattern, config.least_confidence),
+    "lsl": lambda config: Lsl(config.paths or None, config.least_confidence),
+    "pupil": lambda config: Pupil(config.surface, config.least_confidence),
 }
+
+
+OF_A_SCHEME = {LSL_SCHEME: Lsl.name, PUPIL_SCHEME: Pupil.name}
+"""Protocols that come from ports of their own alone."""
 
 
 def codec_of(config: Config) -> Codec:
@@ -41,9 +51,12 @@ def codec_of(config: Config) -> Codec:
     Raises:
         ConfigError: for an unknown one, or options that do not fit it.
     """
-    protocol = config.protocol
+    implied = next((name for scheme, name in OF_A_SCHEME.items() if (config.port or "").startswith(scheme)), None)
+    protocol = config.protocol or implied
     if protocol is None and (config.simulate or config.trace is not None):
         protocol = Smi.name
+    if config.port is not None and protocol != implied and (implied or protocol in OF_A_SCHEME.values()):
+        raise ConfigError("protocol", f"one that {config.port} speaks", protocol)
     if protocol not in PROTOCOLS:
         raise ConfigError("protocol", f"one of {', '.join(PROTOCOLS)} (--probe finds out which)", protocol)
     codec = PROTOCOLS[protocol](config)
@@ -56,6 +69,11 @@ def codec_of(config: Config) -> Codec:
 def unit_of(config: Config, codec: Codec) -> Unit:
     """What the device's numbers count: as the settings say, else as its protocol does."""
     return config.unit or Unit(codec.unit)
+
+
+def origin_of(config: Config, codec: Codec) -> Origin:
+    """Where the device's (0, 0) is: as the settings say, else as its protocol does."""
+    return config.origin or Origin(codec.origin)
 
 
 def tick_lengths(config: Config, codec: Codec) -> tuple[float, ...]:

@@ -11,9 +11,10 @@ from clients.bridge.codec import MILLISECOND_NS, Codec
 from clients.bridge.config import Config
 from clients.bridge.errors import ConfigError
 from clients.bridge.gaze import GazeOptions, GazePath
+from clients.bridge.lsl import SCHEME as LSL_SCHEME
 from clients.bridge.played import PlayedPort, records
 from clients.bridge.port import Port, SerialPort
-from clients.bridge.protocols import tick_lengths, unit_of
+from clients.bridge.protocols import OF_A_SCHEME, origin_of, tick_lengths, unit_of
 from clients.bridge.recording import ReplayPort, read_recording
 from clients.bridge.screen import Place, Screen, Unit
 from clients.gaze_trace import GazeTrace, GazeTraceError, read_gaze_trace
@@ -33,7 +34,7 @@ def screen_of(config: Config, display: Mapping[str, Any] | None = None) -> Scree
 
 def place_of(config: Config, codec: Codec, screen: Screen) -> Place:
     """What the device's numbers mean on that screen."""
-    return Place(unit_of(config, codec), config.origin, screen)
+    return Place(unit_of(config, codec), origin_of(config, codec), screen)
 
 
 def path_of(config: Config, codec: Codec) -> GazePath:
@@ -68,6 +69,8 @@ def port_opener(config: Config, codec: Codec) -> Callable[[], Port]:
     """
     if config.port is not None:
         url = config.port
+        if url.startswith(tuple(OF_A_SCHEME)):
+            return network_opener(url, config.surface)
         return lambda: SerialPort(url, config.baud, not config.no_dtr)
     if config.replay is not None:
         recording = read_recording(config.replay)
@@ -78,6 +81,24 @@ def port_opener(config: Config, codec: Codec) -> Callable[[], Port]:
     place = place_of(config, codec, screen_of(config))
     loop = config.loop or config.simulate
     return lambda: PlayedPort(records(trace, codec, place, config.rate_hz, loop), config.speed)
+
+
+def network_opener(url: str, surface: str | None) -> Callable[[], Port]:
+    """What opens a port that another package brings.
+
+    Raises:
+        ConfigError: where that package is missing.
+    """
+    extra = "lsl" if url.startswith(LSL_SCHEME) else "pupil"
+    try:
+        if extra == "lsl":
+            from clients.bridge.lsl_port import LslPort
+
+            return lambda: LslPort(url)
+        from clients.bridge.pupil_port import PupilPort
+    except (ImportError, RuntimeError) as error:  # RuntimeError: pylsl without its library
+        raise ConfigError("port", f"the extra {extra} for it: pip install 'gazetrace[{extra}]'", str(error)) from None
+    return lambda: PupilPort(url, surface)
 
 
 def trace_of(config: Config) -> GazeTrace | None:

@@ -52,6 +52,7 @@ METAVARS = {
     "screen_cm": "WxH", "pattern": "REGEX", "fields": "A,B", "paths": "A=PATH,...", "iscan_columns": "X,Y",
     "smi_format": "FORMAT", "calibration": "FILE", "record": "FILE", "replay": "FILE", "trace": "FILE",
     "status_file": "FILE", "unit": "UNIT", "origin": "ORIGIN", "eye": "EYE", "model": "MODEL", "time_unit": "UNIT",
+    "surface": "NAME",
 }  # fmt: skip
 
 
@@ -207,10 +208,11 @@ def show_probe(config: Config, as_json: bool) -> int:
     """Print what a device sends."""
     from clients.bridge.health import BUSY_SHARE
     from clients.bridge.probe import probe
-    from clients.bridge.protocols import codec_of
+    from clients.bridge.protocols import OF_A_SCHEME, codec_of
     from clients.bridge.source import port_opener
 
-    known = codec_of(config) if config.protocol is not None else None
+    of_a_kind = config.port is not None and config.port.startswith(tuple(OF_A_SCHEME))
+    known = codec_of(config) if config.protocol is not None or of_a_kind else None
     found = probe(port_opener(config, known or codec_of(Config(protocol="smi"))), known)
     if as_json:
         print(json.dumps({**found._asdict(), "samples": [sample._asdict() for sample in found.samples]}, indent=2))

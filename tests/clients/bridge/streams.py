@@ -11,7 +11,9 @@ from clients.bridge.eyetribe import EyeTribe
 from clients.bridge.gazepoint import Gazepoint
 from clients.bridge.iscan import IscanAscii, IscanBinary
 from clients.bridge.json_lines import JsonLines
+from clients.bridge.lsl import Lsl
 from clients.bridge.pattern_lines import PatternLines
+from clients.bridge.pupil import Pupil
 from clients.bridge.sample import Eye, Point, Sample, gaze_of
 from clients.bridge.smi import Smi
 
@@ -31,6 +33,8 @@ CODECS: dict[str, Callable[[], Codec]] = {
     "csv": lambda: CsvLines(("t", "x", "y")),
     "jsonl": JsonLines,
     "regex": PatternLines,
+    "lsl": Lsl,
+    "pupil": lambda: Pupil("screen"),
 }
 
 

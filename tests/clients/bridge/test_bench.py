@@ -90,13 +90,14 @@ def recorded_run(folder: Path, service: str, seconds: float) -> Told:
 
 def figures(told: Told) -> str:
     """The same for people: the latencies of the median and of the worst health line, which come every 5 s."""
-    p50, p99 = (sorted(line[f"latency_ms_{name}"] for line in told.health) for name in ("p50", "p99"))
+    sending = [line for line in told.health if line["latency_ms_p50"] is not None]
+    p50, p99 = (sorted(line[f"latency_ms_{name}"] for line in sending) for name in ("p50", "p99"))
     sent, discarded, late_ms = told.emitted["sent"], told.emitted["discarded"], told.emitted["latest_ns"] / 1e6
     return (
         f"\n{sent:,} records sent (the latest {late_ms:.1f} ms after its time), {discarded} discarded by the tracker, "
         f"{told.decoded:,} decoded from the recording, {told.bad} damaged; last byte to sent: p50 {p50[len(p50) // 2]} "
         f"ms, p99 {p99[len(p99) // 2]} ms, in the worst 5 s {p99[-1]} ms; {told.cpu_share:.0%} of a core; "
-        f"{told.health[-1]['dropped']} superseded\n"
+        f"{told.health[-1]['dropped']} superseded, {told.health[-1]['connections']} connections\n"
     )
 
 
