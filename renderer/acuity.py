@@ -1,45 +1,32 @@
-"""How fine the eye sees away from the gaze: cut-off frequency and unit angle.
+"""How fine the eye sees away from the gaze: cut-off frequency and unit angle, by one of several models.
 
-Peli, Yang and Goldstein (1991), as used by Siekawa and Mantiuk (2014), equations 1 to 3, and two more
-models of the same form, in which the unit angle grows linearly with eccentricity.
+Equations 1 to 3 of Siekawa and Mantiuk (2014). Beside their model, after Peli, Yang and Goldstein (1991), there are
+others; each is declared in a file of its own or of its family.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from renderer.acuity_model import AcuityModel
 from renderer.errors import SettingsError, require_choice, require_number
+from renderer.linear_acuity import GEISLER_PERRY, GUENTER, PELI
+from renderer.stela_csf import STELACSF
+from renderer.watson import WATSON
 
-MODELS = ("peli", "geisler-perry", "guenter")
+ACUITY_MODELS: Mapping[str, AcuityModel] = {
+    model.name: model for model in (PELI, GEISLER_PERRY, GUENTER, WATSON, STELACSF)
+}
+MODELS = tuple(ACUITY_MODELS)
 ECCENTRICITIES = ("exact", "paper")
-
-E1_CPD = 43.1
-"""Cut-off frequency at the fovea [cpd] (Siekawa and Mantiuk 2014, eq. 2)."""
-
-E2_DEG = 3.118
-"""Eccentricity at which the cut-off has halved [deg] (Siekawa and Mantiuk 2014, eq. 2)."""
 
 K_THRESHOLD = (0.030, 0.057)
 """Range of the fall-off k of eq. 1 [1/(cpd deg)] over observers and tasks (Peli et al. 1991)."""
-
-GEISLER_PERRY_LOG_CONTRAST = math.log(64.0)
-"""ln(1/CT0), CT0 = 1/64 (Geisler and Perry 1998)."""
-
-GEISLER_PERRY_ALPHA = 0.106
-"""Spatial decay alpha [1/cpd] (Geisler and Perry 1998)."""
-
-GEISLER_PERRY_E2_DEG = 2.3
-"""Half-resolution eccentricity e2 [deg] (Geisler and Perry 1998)."""
-
-GUENTER_SLOPE = 1.32 / 60.0
-"""Growth of the minimum angle of resolution [deg/deg] (Guenter et al. 2012, the cautious end)."""
-
-GUENTER_FOVEA_DEG = 1.0 / 48.0
-"""Minimum angle of resolution at the fovea [deg] (Guenter et al. 2012)."""
 
 MAX_SCALE = 1000.0
 MAX_MARGIN_DEG = 90.0
@@ -50,7 +37,7 @@ class Acuity:
     """How the eye's resolution is taken into account.
 
     Attributes:
-        model: `peli` (the paper's, default), `geisler-perry` or `guenter`.
+        model: `peli` (the paper's, default), `geisler-perry`, `guenter`, `watson` or `stelacsf`.
         eccentricity: `exact`: the eye is in front of the screen's centre (default); `paper`: in front
             of the gaze (eq. 4).
         scale: factor on the unit angle, 0.001 to 1000: 2 makes cells twice as wide as the eye calls for.
@@ -95,7 +82,7 @@ def cut_off_cpd(eccentricity_deg: ArrayLike, model: str = "peli", display_cpd: f
     """Highest frequency the eye resolves, f_c = min(display_cpd, E1*E2/(E2+E)) (eq. 2), or another model's.
 
     Args:
-        eccentricity_deg: E [deg], any shape, 0 or more.
+        eccentricity_deg: E [deg], any shape, 0 to 180.
         model: one of `MODELS`.
         display_cpd: highest frequency the display can show [cpd].
 
@@ -105,16 +92,16 @@ def cut_off_cpd(eccentricity_deg: ArrayLike, model: str = "peli", display_cpd: f
     Raises:
         SettingsError: for an unknown model.
     """
-    floor_deg, slope = unit_angle_line(model)
-    cut_off = 0.5 / (floor_deg + slope * np.asarray(eccentricity_deg, dtype=np.float64))
-    return np.minimum(display_cpd, cut_off)
+    known = acuity_model(model)
+    cut_off = known.cut_off_cpd(np.asarray(eccentricity_deg, dtype=np.float64))
+    return np.asarray(np.minimum(min(display_cpd, known.limit_cpd), cut_off))
 
 
 def unit_angle_deg(eccentricity_deg: ArrayLike, model: str = "peli") -> NDArray[np.float64]:
     """Smallest angle worth a ray, alpha = 1/(2*f_c), without the display's limit (eq. 3).
 
     Args:
-        eccentricity_deg: E [deg], any shape, 0 or more.
+        eccentricity_deg: E [deg], any shape, 0 to 180.
         model: one of `MODELS`.
 
     Returns:
@@ -123,24 +110,15 @@ def unit_angle_deg(eccentricity_deg: ArrayLike, model: str = "peli") -> NDArray[
     Raises:
         SettingsError: for an unknown model.
     """
-    floor_deg, slope = unit_angle_line(model)
-    return floor_deg + slope * np.asarray(eccentricity_deg, dtype=np.float64)
+    return np.asarray(0.5 / cut_off_cpd(eccentricity_deg, model))
 
 
-def unit_angle_line(model: str) -> tuple[float, float]:
-    """The unit angle as a line in eccentricity: alpha = floor_deg + slope * E, (floor_deg, slope).
-
-    peli: (E2 + E)/(2*E1*E2). geisler-perry: alpha_gp*(e2 + E)/(2*e2*ln 64). guenter: half a cycle is
-    the minimum angle of resolution itself, 1/48 deg + slope*E.
+def acuity_model(name: str) -> AcuityModel:
+    """The model of that name.
 
     Raises:
-        SettingsError: for an unknown model.
+        SettingsError: for an unknown one.
     """
-    if model == "peli":
-        return 1 / (2 * E1_CPD), 1 / (2 * E1_CPD * E2_DEG)
-    if model == "geisler-perry":
-        floor_deg = GEISLER_PERRY_ALPHA / (2 * GEISLER_PERRY_LOG_CONTRAST)
-        return floor_deg, floor_deg / GEISLER_PERRY_E2_DEG
-    if model == "guenter":
-        return GUENTER_FOVEA_DEG, GUENTER_SLOPE
-    raise SettingsError("acuity.model", "one of " + ", ".join(MODELS), model)
+    if name not in ACUITY_MODELS:
+        raise SettingsError("acuity.model", "one of " + ", ".join(MODELS), name)
+    return ACUITY_MODELS[name]

@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.acuity import Acuity, unit_angle_line
+from renderer.acuity import Acuity, acuity_model
+from renderer.acuity_model import LARGEST_ECCENTRICITY_DEG, STEPS_PER_DEG, unit_angle_table
 from renderer.display import Display
 from renderer.gaze import Gaze, GazeBucket
 from renderer.kernel import formula, kernel, roomy_kernel
@@ -44,7 +45,9 @@ class EyeGeometry(NamedTuple):
         sway: how far the tracker's error may move the foot besides (paper's form) [cm], else 0.
         relief_deg: angle by which every eccentricity is understated, so that the cells serve every
             gaze of the bucket and the tracker's error.
-        floor_deg, slope: the unit angle as a line in eccentricity, acuity scale included.
+        floor_deg, slope: the unit angle as a line in eccentricity, acuity scale included; or its least value, and 0.
+        table: (n,) float64, the unit angle [deg] at every 1/64 deg of eccentricity, acuity scale included; None
+            where it is a line.
         max_side: largest cell side [px].
     """
 
@@ -63,6 +66,7 @@ class EyeGeometry(NamedTuple):
     relief_deg: float
     floor_deg: float
     slope: float
+    table: NDArray[np.float64] | None
     max_side: float
 
 
@@ -72,7 +76,7 @@ def eye_geometry(display: Display, acuity: Acuity, bucket: GazeBucket) -> EyeGeo
     gaze_x = (bucket.x - display.width_px / 2) * pitch_x
     gaze_y = (bucket.y - display.height_px / 2) * pitch_y
     half_x, half_y = bucket.side_px / 2 * pitch_x, bucket.side_px / 2 * pitch_y
-    floor_deg, slope = unit_angle_line(acuity.model)
+    floor_deg, slope, table = _unit_angles(acuity)
     paper = acuity.eccentricity == "paper"
     reach_deg = 0.0 if paper else _bucket_reach_deg(gaze_x, gaze_y, half_x, half_y, display.distance_cm)
     return EyeGeometry(
@@ -89,8 +93,9 @@ def eye_geometry(display: Display, acuity: Acuity, bucket: GazeBucket) -> EyeGeo
         half_y=half_y if paper else 0.0,
         sway=display.distance_cm * math.tan(math.radians(acuity.margin_deg)) if paper else 0.0,
         relief_deg=reach_deg + acuity.margin_deg,
-        floor_deg=floor_deg * acuity.scale,
-        slope=slope * acuity.scale,
+        floor_deg=floor_deg,
+        slope=slope,
+        table=table,
         max_side=float(max(display.width_px, display.height_px)),
     )
 
@@ -124,9 +129,18 @@ def largest_cell_side(eye: EyeGeometry) -> int:
         for y in (-bottom, bottom):
             angle = max(angle, _eccentricity(eye, x, y))
             reach2 = max(reach2, (x - eye.foot_x) ** 2 + (y - eye.foot_y) ** 2)
-    unit = eye.floor_deg + eye.slope * (angle if angle <= 90.0 else 180.0)
+    unit = _unit_angle(eye.floor_deg, eye.slope, eye.table, angle if angle <= 90.0 else 180.0)
     beta = _pixel_angle(min(eye.pitch_x, eye.pitch_y), reach2, eye.distance)
     return int(max(1.0, min(eye.max_side, unit / max(beta, 1e-300))))
+
+
+def _unit_angles(acuity: Acuity) -> tuple[float, float, NDArray[np.float64] | None]:
+    """`floor_deg`, `slope` and `table` of an `EyeGeometry`."""
+    model = acuity_model(acuity.model)
+    if model.line is not None:
+        floor_deg, slope = model.line
+        return floor_deg * acuity.scale, slope * acuity.scale, None
+    return 0.5 / model.limit_cpd * acuity.scale, 0.0, unit_angle_table(model) * acuity.scale
 
 
 def _bucket_reach_deg(gaze_x: float, gaze_y: float, half_x: float, half_y: float, distance: float) -> float:
@@ -196,6 +210,20 @@ def _eccentricity(eye: EyeGeometry, x: float, y: float) -> float:
 
 
 @formula
+def _unit_angle(floor_deg: float, slope: float, table: NDArray[np.float64] | None, angle: float) -> float:
+    """Smallest angle worth a ray at an eccentricity of 0 deg or more, times the acuity scale [deg]; never falls.
+
+    Kernels are compiled once for a line and once for a table, since loops over a line vectorise.
+    """
+    if table is None:
+        return floor_deg + slope * angle
+    place = min(angle, LARGEST_ECCENTRICITY_DEG) * STEPS_PER_DEG
+    node = min(int(place), len(table) - 2)
+    below, above = float(table[node]), float(table[node + 1])
+    return max(floor_deg, below + (place - node) * (above - below))
+
+
+@formula
 def _pixel_angle(pitch: float, reach2: float, distance: float) -> float:
     """beta: angle of a pixel of width `pitch`, seen along the line from the foot, sqrt(reach2) away [deg]."""
     return _arc(pitch * distance, distance * distance + reach2 - 0.25 * pitch * pitch) * DEG_PER_RAD
@@ -220,7 +248,7 @@ def cell_size(eye: EyeGeometry, x: float, y: float) -> float:
     weight = uu / (eye.pitch_x * eye.pitch_x) + vv / (eye.pitch_y * eye.pitch_y)
     pitch = math.sqrt((uu + vv) / weight) if weight > 0.0 else max(eye.pitch_x, eye.pitch_y)
     beta = _pixel_angle(pitch, near_x * near_x + near_y * near_y, eye.distance)
-    unit = eye.floor_deg + eye.slope * max(0.0, _eccentricity(eye, x, y) - eye.relief_deg)
+    unit = _unit_angle(eye.floor_deg, eye.slope, eye.table, max(0.0, _eccentricity(eye, x, y) - eye.relief_deg))
     return max(1.0, min(eye.max_side, unit / beta))
 
 
@@ -259,8 +287,8 @@ def _even_cell_size(eye: EyeGeometry, x: float, y: float, reach: float) -> int:
     narrow = _pixel_angle(pitch * (1.0 - wobble), far * far, eye.distance)
     swing = ARCSINE_SLACK * DEG_PER_RAD * reach / from_eye
     angle = _eccentricity(eye, x, y) - eye.relief_deg
-    low = (eye.floor_deg + eye.slope * max(0.0, angle - swing)) / wide
-    high = (eye.floor_deg + eye.slope * max(0.0, angle + swing)) / narrow
+    low = _unit_angle(eye.floor_deg, eye.slope, eye.table, max(0.0, angle - swing)) / wide
+    high = _unit_angle(eye.floor_deg, eye.slope, eye.table, max(0.0, angle + swing)) / narrow
     low, high = max(1.0, min(eye.max_side, low)), max(1.0, min(eye.max_side, high))
     return int(low) if int(low) == int(high) else 0
 
@@ -280,9 +308,21 @@ def fill_cell_sizes(eye: EyeGeometry, first_row: int, first_column: int, sizes: 
 
     Blocks over which rho provably does not change are filled at once; others are quartered, down to pixels.
     """
+    pending = np.zeros((4 * LARGEST_BLOCK_PX, 3), dtype=np.int64)
+    _fill_blocks(eye, first_row, first_column, pending, sizes)
+
+
+@kernel
+def _fill_blocks(
+    eye: EyeGeometry,
+    first_row: int,
+    first_column: int,
+    pending: NDArray[np.int64],
+    sizes: NDArray[np.uint16],
+) -> None:
+    """The same, with room in `pending` for the blocks that are yet to be looked at."""
     rows, columns = sizes.shape
     diagonal = math.sqrt(eye.pitch_x * eye.pitch_x + eye.pitch_y * eye.pitch_y)
-    pending = np.zeros((4 * LARGEST_BLOCK_PX, 3), dtype=np.int64)
     for block_top in range(0, rows, LARGEST_BLOCK_PX):
         for block_left in range(0, columns, LARGEST_BLOCK_PX):
             pending[0, 0], pending[0, 1], pending[0, 2] = block_top, block_left, LARGEST_BLOCK_PX

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 
+from renderer.acuity import Acuity
 from renderer.allocator import keep_freed_memory
 from renderer.cellmap import CellMap
 from renderer.deadline import NS_PER_MS, affordable_samples, fitted
@@ -147,7 +148,13 @@ class Renderer:
                 for reconstruction in RECONSTRUCTIONS:
                     quality = Quality(map=kind, samples_per_cell=2, reconstruction=reconstruction)
                     self.render(scene, FrameRequest(Gaze(1e4, 16.0), display, None, quality, linear))
-        for quality in (Quality(deadline_ms=1.0), Quality(antialiasing="adaptive", samples_per_cell=8)):
+        tabulated = Acuity(model="watson")
+        for quality in (
+            Quality(deadline_ms=1.0),
+            Quality(deadline_ms=1.0, acuity=tabulated),
+            Quality(map="scanline", acuity=tabulated),
+            Quality(antialiasing="adaptive", samples_per_cell=8),
+        ):
             self.render(scene, FrameRequest(Gaze(0.0, 0.0), display, None, quality))
         eccentricity_deg(display, Gaze(0.0, 0.0))
         self._pace = Pace(self.threads)

@@ -67,7 +67,8 @@ DeadlineMs = Annotated[
     ),
 ]
 AcuityModel = Annotated[
-    Literal["peli", "geisler-perry", "guenter"], Field(description="what the eye resolves away from the gaze")
+    Literal["peli", "geisler-perry", "guenter", "watson", "stelacsf"],
+    Field(description="what the eye resolves away from the gaze"),
 ]
 Eccentricity = Annotated[
     Literal["exact", "paper"], Field(description="the eye is in front of the screen's centre, or of the gaze")

@@ -18,10 +18,37 @@ from renderer.gaze import Gaze, GazeBucket
 PAPER_SCREEN = Display(1920, 1080, 50.0, 35.0, 60.0)
 PAPER_ACUITY = Acuity(eccentricity="paper")
 
+WATSON_MERIDIANS = ((0.9851, 1.058, 22.14), (0.9935, 1.035, 16.35), (0.9729, 1.084, 7.633), (0.9960, 0.9932, 12.13))
+
+
+def watson_cpd(e: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Half of the midgets make a hexagonal lattice of density D that resolves sqrt(D / (2 sqrt(3)))."""
+    midgets = [
+        2 * 1.12 * 14804.6 * (a * (1 + e / r2) ** -2 + (1 - a) * np.exp(-e / re)) / 1.12 / (1 + e / 41.03)
+        for a, r2, re in WATSON_MERIDIANS
+    ]
+    return np.sqrt(np.max(midgets, axis=0) / 2 / (2 * math.sqrt(3)))
+
+
+def stela_cpd(e: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Read backwards: the eccentricity at which a frequency is just seen has a closed form."""
+    cpd = np.geomspace(0.6, 2000, 400_001)
+    peak = 1.565 * (1 + 51.19 / 100) ** -0.245
+    parabola = 10 ** -(np.log10(cpd / peak) ** 2 / 2**1.12573)
+    area = 270 / (1 + (cpd / 0.65) ** 2)
+    seen = 65.40 * (1 + 29.83 / 100) ** -0.2038 * np.where(cpd < peak, np.maximum(parabola, 0.9164), parabola)
+    seen_to = np.log10(seen * cpd * np.sqrt(area / (1 + area))) / (0.01351 + 0.01713 * cpd)
+    falling = slice(np.argmax(seen_to), None)
+    found = np.interp(np.minimum(e, 60.0), seen_to[falling][::-1], cpd[falling][::-1])
+    return np.asarray(np.minimum(64.0, found))
+
+
 CUT_OFF_CPD: Mapping[str, Callable[[NDArray[np.float64]], NDArray[np.float64]]] = {
     "peli": lambda e: 43.1 * 3.118 / (3.118 + e),
     "geisler-perry": lambda e: math.log(64) * 2.3 / (0.106 * (e + 2.3)),
     "guenter": lambda e: 1 / (2 * (1.32 / 60 * e + 1 / 48)),
+    "watson": watson_cpd,
+    "stelacsf": stela_cpd,
 }
 """Each model as its authors print it (Peli et al. as in Siekawa and Mantiuk 2014, eq. 2)."""
 
