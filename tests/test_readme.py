@@ -97,7 +97,9 @@ def test_each_command_works(words: list[str], tmp_path: Path, monkeypatch: pytes
         assert build_parser().parse_args(words).run is not None
         return
     (tmp_path / "eye.csv").write_text("t_ms,x_px,y_px\n0,960,540\n40,1200,300\n")
-    small = ["--size", "64x36", "--samples", "1"] if words[0] in ("render", "bench", "animate", "watch") else []
+    shrinks = ("render", "bench", "animate", "watch", "figures")
+    small = ["--size", "64x36", "--samples", "1"] if words[0] in shrinks else []
+    small += ["--repeats", "1"] if words[0] == "figures" else []
     small += ["--seconds", {"animate": "0.1", "watch": "1.5"}[words[0]]] if words[0] in ("animate", "watch") else []
     assert main([*words, *small]) == 0
     if "-o" in words:
@@ -107,7 +109,7 @@ def test_each_command_works(words: list[str], tmp_path: Path, monkeypatch: pytes
 
 def test_the_table_of_commands_is_complete() -> None:
     named = {words.split()[1].strip("`") for words, _ in table("Commands")}
-    assert named == {"serve", "render", "scenes", "bench", "animate", "watch", "bridge"}
+    assert named == {"serve", "render", "scenes", "bench", "animate", "watch", "bridge", "figures"}
 
 
 def test_every_setting_is_in_the_table_with_its_default() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -16,7 +15,6 @@ from renderer.pipeline import Renderer
 from service.app import create_app
 from service.server import Server, address_of, listen
 from service.settings import Settings
-from tests.service.chromium import Page, browsing, find_chromium
 
 PATIENCE_S = 120
 """Longest wait for anything; kernels may have to be compiled first."""
@@ -97,21 +95,3 @@ def client_of(renderer: Renderer) -> Iterator[Callable[[Settings], httpx.Client]
             return stack.enter_context(httpx.Client(base_url=address, timeout=PATIENCE_S))
 
         yield start
-
-
-@pytest.fixture(scope="session")
-def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
-    """A browser."""
-    chromium = find_chromium()
-    if chromium is None and os.environ.get("GAZETRACE_REQUIRE_BROWSER") != "1":
-        pytest.skip("no Chromium here")
-    assert chromium is not None, "GAZETRACE_REQUIRE_BROWSER is set, and there is no Chromium"
-    with browsing(chromium, tmp_path_factory.mktemp("profile")) as page:
-        yield page
-
-
-@pytest.fixture
-def page(browser: Page) -> Iterator[Page]:
-    """A browser with nothing open, and nothing kept from before."""
-    yield browser
-    browser.leave()
