@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import hmac
 import ipaddress
+from enum import Enum
 from http import HTTPStatus
 
-from starlette.datastructures import Headers, MutableHeaders
+from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.problem import problem
@@ -23,15 +24,6 @@ OPEN_FOLDER = "/page/"
 
 DRAINED_BYTES = 4 << 20
 """How much of a too large body is read and forgotten, so that its sender lives to read the reply."""
-
-SECURITY_HEADERS = {
-    "X-Content-Type-Options": "nosniff",
-    "X-Frame-Options": "DENY",
-    "Referrer-Policy": "no-referrer",
-    "Cross-Origin-Resource-Policy": "same-origin",
-    "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; "
-    "img-src 'self' blob:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
-}
 
 
 def host_refusal(settings: Settings, host: str) -> str | None:
@@ -61,36 +53,40 @@ def origin_refusal(settings: Settings, headers: Headers) -> str | None:
     return "pages of other origins may not use this service without saying who they are (fetch with CORS)"
 
 
-def token_refusal(settings: Settings, authorization: str | None) -> str | None:
-    """Why an Authorization header is refused; None if it is not, or if nobody is asked for a token."""
+class Right(Enum):
+    """What a token lets its holder do."""
+
+    VIEW = "look at frames"
+    GAZE = "be a gaze"
+
+
+EVERY_RIGHT = frozenset(Right)
+
+
+def rights_of(settings: Settings, authorization: str | None) -> frozenset[Right] | str:
+    """What an Authorization header entitles to; or why to nothing."""
     if settings.token is None:
-        return None
+        return EVERY_RIGHT
     if authorization is None:
         return "this service asks for its token: send the header Authorization: Bearer TOKEN"
-    scheme, _, token = authorization.partition(" ")
-    right = hmac.compare_digest(token.strip().encode(), settings.token.encode())
-    if scheme.lower() == "bearer" and right:
-        return None
-    return "the token is wrong"
+    scheme, _, shown = authorization.partition(" ")
+    rights: frozenset[Right] = frozenset()
+    for token, granted in (
+        (settings.token, EVERY_RIGHT),
+        (settings.view_token, frozenset({Right.VIEW})),
+        (settings.gaze_token, frozenset({Right.GAZE})),
+    ):
+        if token is not None and hmac.compare_digest(shown.strip().encode(), token.encode()):
+            rights |= granted
+    return rights if rights and scheme.lower() == "bearer" else "the token is wrong"
 
 
-class SafeHeaders:
-    """Adds `SECURITY_HEADERS` to every reply."""
-
-    def __init__(self, app: ASGIApp) -> None:
-        self._app = app
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer one request."""
-
-        async def send_safely(message: Message) -> None:
-            if message["type"] == "http.response.start":
-                headers = MutableHeaders(scope=message)
-                for name, value in SECURITY_HEADERS.items():
-                    headers[name] = value
-            await send(message)
-
-        await self._app(scope, receive, send_safely)
+def right_refusal(settings: Settings, authorization: str | None, right: Right) -> str | None:
+    """Why an Authorization header does not entitle to `right`; None if it does, or if nobody is asked for a token."""
+    rights = rights_of(settings, authorization)
+    if isinstance(rights, str):
+        return rights
+    return None if right in rights else f"this token does not entitle to {right.value}"
 
 
 class OwnNamesOnly:
@@ -114,7 +110,7 @@ class OwnNamesOnly:
 
 
 class TokenOnly:
-    """Refuses requests without the token, where there is one and the path is not open."""
+    """Refuses requests without a token that lets look, where there is one and the path is not open."""
 
     def __init__(self, app: ASGIApp, settings: Settings) -> None:
         self._app = app
@@ -124,11 +120,12 @@ class TokenOnly:
         """Answer one request."""
         if scope["type"] == "http" and not _is_open(scope["path"]):
             authorization = Headers(scope=scope).get("authorization")
-            if refusal := token_refusal(self._settings, authorization):
-                challenge = 'Bearer realm="gazetrace"' + (', error="invalid_token"' if authorization else "")
-                reply = problem(
-                    HTTPStatus.UNAUTHORIZED, refusal, "token-needed", headers={"WWW-Authenticate": challenge}
-                )
+            if refusal := right_refusal(self._settings, authorization, Right.VIEW):
+                known = not isinstance(rights_of(self._settings, authorization), str)
+                error = "insufficient_scope" if known else "invalid_token"
+                challenge = 'Bearer realm="gazetrace"' + (f', error="{error}"' if authorization else "")
+                status = HTTPStatus.FORBIDDEN if known else HTTPStatus.UNAUTHORIZED
+                reply = problem(status, refusal, "token-needed", headers={"WWW-Authenticate": challenge})
                 await reply(scope, receive, send)
                 return
         await self._app(scope, receive, send)

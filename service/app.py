@@ -15,9 +15,10 @@ from starlette.middleware.cors import CORSMiddleware
 from renderer.library import SceneLibrary
 from renderer.pipeline import Renderer
 from service import cells, frames, pages, scenes, stream
-from service.access import OwnNamesOnly, SafeHeaders, SmallBodiesOnly, TokenOnly
+from service.access import OwnNamesOnly, SmallBodiesOnly, TokenOnly
 from service.catalogue import Catalogue
 from service.desk import Desk
+from service.headers import SafeHeaders
 from service.jobs import JobQueue
 from service.metrics import Metrics
 from service.openapi import describe_api

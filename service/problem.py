@@ -14,6 +14,7 @@ from starlette.exceptions import HTTPException
 from starlette.responses import Response
 
 from renderer.errors import SceneError, SettingsError, UnknownScene
+from service.headers import SECURITY_HEADERS
 from service.jobs import Busy, ClientLeft, Stopping
 from service.rendering import NotReady, OverLimit
 
@@ -148,7 +149,8 @@ def _as_asked(field: str, request: Request) -> str:
 
 
 def _mistake(request: Request, _: Exception) -> Response:
-    return problem(500, f"{request.method} {request.url.path} failed by a mistake of the service; its log says more")
+    detail = f"{request.method} {request.url.path} failed by a mistake of the service; its log says more"
+    return problem(500, detail, headers=SECURITY_HEADERS)
 
 
 def field_error(item: Mapping[str, object]) -> FieldError:

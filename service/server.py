@@ -10,6 +10,7 @@ from fastapi import FastAPI
 
 from renderer.errors import SettingsError
 from service.app import create_app
+from service.connection import connection_of
 from service.settings import Settings
 
 GOODBYE_S = 5
@@ -65,6 +66,8 @@ def server_config(app: FastAPI, settings: Settings) -> uvicorn.Config:
         app,
         log_config=None,
         access_log=False,
+        http=connection_of(settings),
+        h11_max_incomplete_event_size=settings.max_header_bytes,
         ws="websockets-sansio",
         ws_max_size=settings.max_message_bytes,
         ws_ping_interval=PING_S,
@@ -74,6 +77,8 @@ def server_config(app: FastAPI, settings: Settings) -> uvicorn.Config:
         proxy_headers=False,
         server_header=False,
         timeout_graceful_shutdown=GOODBYE_S,
+        ssl_certfile=settings.certfile,
+        ssl_keyfile=settings.keyfile,
     )
 
 
@@ -99,4 +104,4 @@ def address_of(settings: Settings, listener: socket.socket) -> str:
     host = {"0.0.0.0": "127.0.0.1", "::": "[::1]", "": "127.0.0.1"}.get(settings.host, settings.host)
     if ":" in host and not host.startswith("["):
         host = f"[{host}]"
-    return f"http://{host}:{port}"
+    return f"{'http' if settings.certfile is None else 'https'}://{host}:{port}"

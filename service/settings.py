@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ipaddress
 import os
+import ssl
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
@@ -27,6 +28,10 @@ MOST_BYTES = 1 << 44
 MOST_CAMERA_RAYS = 10**13
 MOST_SESSIONS = 1024
 LEAST_MESSAGE_BYTES = 1024
+LEAST_HEADER_BYTES, MOST_HEADER_BYTES = 1024, 1 << 20
+MOST_CONNECTIONS = 65_536
+MOST_MESSAGES_PER_S = 1_000_000
+LONGEST_CLIENT_TIMEOUT_S = 3600
 LONGEST_EXPIRY_S = 7 * 24 * 3600
 
 
@@ -38,6 +43,10 @@ class Settings:
         host: address to listen on; other than this machine's own (loopback) it needs `token` or `insecure`.
         port: port to listen on, 0 for any free one.
         token: what a client must send as `Authorization: Bearer TOKEN`; None asks nobody.
+        view_token: what may be sent in its place, and lets its holder look but not be a gaze.
+        gaze_token: what may be sent in its place by a gaze source, and lets its holder do nothing else.
+        certfile: certificate chain (PEM), to serve HTTPS.
+        keyfile: its private key (PEM); None if it is in `certfile`.
         insecure: True to listen beyond this machine without a token.
         scenes: folder of scene folders; None for the built-in scenes alone.
         threads: cores to render on; None for all.
@@ -46,11 +55,15 @@ class Settings:
         max_depth: most mirrors and boundaries a ray may meet.
         max_camera_rays: most camera rays a frame: cells times samples a cell.
         max_body_bytes: largest request body.
+        max_header_bytes: largest head of a request: its first line and its headers.
+        max_connections: connections at once, streams among them; beyond, a client is told to come back.
+        client_timeout_s: how long a client may take to send a request, and may leave a reply unread [s].
         max_concurrent_renders: frames rendered at once.
         max_queued_renders: frames that may wait for their turn; beyond, a client is told to come back.
         max_sessions: streaming sessions at once.
         max_viewers: viewers, and gaze sources, of one session.
         max_message_bytes: longest message of a stream that is read.
+        max_messages_per_s: most messages a second of a client of a stream, over any second.
         session_expiry_s: how long a session is kept for those who left it [s].
         map_cache_bytes: memory for cell maps.
         store_bytes: memory for samples of earlier frames.
@@ -65,6 +78,10 @@ class Settings:
     host: str = "127.0.0.1"
     port: int = 8321
     token: str | None = field(default=None, repr=False)
+    view_token: str | None = field(default=None, repr=False)
+    gaze_token: str | None = field(default=None, repr=False)
+    certfile: Path | None = None
+    keyfile: Path | None = None
     insecure: bool = False
     scenes: Path | None = None
     threads: int | None = None
@@ -73,11 +90,15 @@ class Settings:
     max_depth: int = 16
     max_camera_rays: int = 200_000_000
     max_body_bytes: int = 64 << 10
+    max_header_bytes: int = 32 << 10
+    max_connections: int = 512
+    client_timeout_s: int = 20
     max_concurrent_renders: int = 4
     max_queued_renders: int = 16
     max_sessions: int = 16
     max_viewers: int = 16
     max_message_bytes: int = MAX_TEXT_BYTES
+    max_messages_per_s: int = 2500
     session_expiry_s: int = 60
     map_cache_bytes: int = 256 << 20
     store_bytes: int = 512 << 20
@@ -96,11 +117,15 @@ class Settings:
         require_integer("max_depth", self.max_depth, 0, MAX_DEPTH)
         require_integer("max_camera_rays", self.max_camera_rays, 1, MOST_CAMERA_RAYS)
         require_integer("max_body_bytes", self.max_body_bytes, 1, MOST_BYTES)
+        require_integer("max_header_bytes", self.max_header_bytes, LEAST_HEADER_BYTES, MOST_HEADER_BYTES)
+        require_integer("max_connections", self.max_connections, 1, MOST_CONNECTIONS)
+        require_integer("client_timeout_s", self.client_timeout_s, 1, LONGEST_CLIENT_TIMEOUT_S)
         require_integer("max_concurrent_renders", self.max_concurrent_renders, 1, MOST_RENDERS)
         require_integer("max_queued_renders", self.max_queued_renders, 0, MOST_QUEUED)
         require_integer("max_sessions", self.max_sessions, 1, MOST_SESSIONS)
         require_integer("max_viewers", self.max_viewers, 1, MOST_SESSIONS)
         require_integer("max_message_bytes", self.max_message_bytes, LEAST_MESSAGE_BYTES, MAX_TEXT_BYTES)
+        require_integer("max_messages_per_s", self.max_messages_per_s, 1, MOST_MESSAGES_PER_S)
         require_integer("session_expiry_s", self.session_expiry_s, 0, LONGEST_EXPIRY_S)
         for name in ("map_cache_bytes", "store_bytes", "scene_bytes"):
             require_integer(name, getattr(self, name), 0, MOST_BYTES)
@@ -108,16 +133,39 @@ class Settings:
             raise SettingsError("scenes", "a folder", str(self.scenes))
         for origin in self.allowed_origins:
             _require_origin(origin)
+        self._require_certificate()
         self._require_token()
 
+    def _require_certificate(self) -> None:
+        """Refuse files that are not there or hold something else, and a key without a certificate."""
+        for name in ("certfile", "keyfile"):
+            path = getattr(self, name)
+            if path is not None and not os.path.isfile(path):
+                raise SettingsError(name, "a file", str(path))
+        if self.keyfile is not None and self.certfile is None:
+            raise SettingsError("keyfile", "a certfile that it belongs to", "none")
+        if self.certfile is not None:
+            try:
+                ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(self.certfile, self.keyfile, lambda: "")
+            except (ssl.SSLError, OSError) as error:
+                raise SettingsError(
+                    "certfile", "a certificate and its key without a password, in PEM", f"{self.certfile} ({error})"
+                ) from None
+
     def _require_token(self) -> None:
-        """Refuse a weak token, and an address that others reach without one."""
-        if self.token is not None:
-            if not self.token.isascii() or not self.token.isprintable() or " " in self.token:
-                raise SettingsError("token", "visible ASCII characters", "others")
-            if len(self.token) < SHORTEST_TOKEN:
-                raise SettingsError("token", f"{SHORTEST_TOKEN} characters or more", f"{len(self.token)} characters")
-        elif not self.insecure and not is_loopback(self.host):
+        """Refuse weak tokens, tokens that are no alternatives, and an address that others reach without one."""
+        tokens = {name: getattr(self, name) for name in ("token", "view_token", "gaze_token")}
+        stated = {name: token for name, token in tokens.items() if token is not None}
+        for name, token in stated.items():
+            if not token.isascii() or not token.isprintable() or " " in token:
+                raise SettingsError(name, "visible ASCII characters", "others")
+            if len(token) < SHORTEST_TOKEN:
+                raise SettingsError(name, f"{SHORTEST_TOKEN} characters or more", f"{len(token)} characters")
+            if self.token is None:
+                raise SettingsError(name, "a token beside it, which may do everything", "none")
+        if len(set(stated.values())) < len(stated):
+            raise SettingsError("token", "tokens that differ from each other", "the same one twice")
+        if self.token is None and not self.insecure and not is_loopback(self.host):
             raise SettingsError(
                 "host", "127.0.0.1, or a token (GAZETRACE_TOKEN) to listen beyond this machine", self.host
             )
@@ -175,7 +223,7 @@ def _switch(name: str, text: str) -> bool:
     raise SettingsError(name, "1 or 0", text)
 
 
-def _folder(_: str, text: str) -> Path:
+def _path(_: str, text: str) -> Path:
     return Path(text).expanduser()
 
 
@@ -186,8 +234,12 @@ def _list(_: str, text: str) -> tuple[str, ...]:
 _READ: Mapping[str, Callable[[str, str], object]] = {
     "host": _text,
     "token": _text,
+    "view_token": _text,
+    "gaze_token": _text,
+    "certfile": _path,
+    "keyfile": _path,
     "insecure": _switch,
-    "scenes": _folder,
+    "scenes": _path,
     "allowed_hosts": _list,
     "allowed_origins": _list,
 }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import Awaitable, Callable, Coroutine
+from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine
 from dataclasses import replace
 from typing import Annotated, Any
 
@@ -14,7 +14,8 @@ from starlette.websockets import WebSocketDisconnect
 
 from renderer.errors import RenderError
 from service import protocol
-from service.access import host_refusal, origin_refusal, token_refusal
+from service.access import Right, host_refusal, origin_refusal, right_refusal, rights_of
+from service.allowance import Allowance
 from service.desk import Desk, TheDesk
 from service.jobs import Stopping
 from service.openapi import ERRORS
@@ -108,17 +109,19 @@ async def _answer(websocket: WebSocket, talk: Callable[[WebSocket, Desk], Awaita
 async def _view(websocket: WebSocket, desk: Desk) -> None:
     first = protocol.decode_stream_up(await _first_text(websocket))
     hello = first if isinstance(first, protocol.Hello) else protocol.Hello()
-    _check_token(websocket, hello)
+    rights = _check_token(websocket, hello, Right.VIEW)
     session, viewer = desk.sessions.view(hello.session)
 
     async def hear(message: protocol.StreamUp) -> None:
+        if isinstance(message, protocol.Gaze) and Right.GAZE not in rights:
+            raise ProtocolError("type", f"expected no gaze, as the token does not entitle to {Right.GAZE.value}")
         await _hear_viewer(session, viewer, message, desk)
 
     async def listen() -> None:
         if first is not hello:
             await hear(first)
-        while True:
-            await hear(protocol.decode_stream_up(await _text(websocket)))
+        async for text in _texts(websocket, desk):
+            await hear(protocol.decode_stream_up(text))
 
     await _exchange(websocket, session, viewer, listen())
 
@@ -129,14 +132,14 @@ async def _feed(websocket: WebSocket, desk: Desk) -> None:
         raise ProtocolError("session", "is required: /v1/gaze?session=NAME")
     if _authorization(websocket) is None and desk.studio.settings.token is not None:
         first = protocol.decode_gaze_up(await _first_text(websocket))
-        _check_token(websocket, first if isinstance(first, protocol.Hello) else protocol.Hello())
+        _check_token(websocket, first if isinstance(first, protocol.Hello) else protocol.Hello(), Right.GAZE)
     else:
-        _check_token(websocket, protocol.Hello())
+        _check_token(websocket, protocol.Hello(), Right.GAZE)
     session, source = desk.sessions.feed(name)
 
     async def listen() -> None:
-        while True:
-            _hear_source(session, source, protocol.decode_gaze_up(await _text(websocket)), desk)
+        async for text in _texts(websocket, desk):
+            _hear_source(session, source, protocol.decode_gaze_up(text), desk)
 
     await _exchange(websocket, session, source, listen())
 
@@ -198,7 +201,9 @@ async def _exchange(websocket: WebSocket, session: Session, outbox: Outbox, list
         await asyncio.wait((hearing, sending), return_when=asyncio.FIRST_COMPLETED)
         if not sending.done():
             error = hearing.exception()
-            if isinstance(error, ProtocolError):
+            if isinstance(error, Refused):
+                outbox.close(error.code, error.error.message, error.error)
+            elif isinstance(error, ProtocolError):
                 outbox.close(CloseCode.PROTOCOL, str(error), refusal(error))
             elif not isinstance(error, WebSocketDisconnect):
                 assert isinstance(error, Exception)
@@ -235,6 +240,24 @@ async def _first_text(websocket: WebSocket) -> str:
         raise Refused(CloseCode.EXPIRED, protocol.Error("idle", message)) from None
 
 
+async def _texts(websocket: WebSocket, desk: Desk) -> AsyncIterator[str]:
+    """What a client says, until it leaves.
+
+    Raises:
+        Refused: if it says too much.
+    """
+    most = desk.studio.settings.max_messages_per_s
+    allowance = Allowance(most, desk.sessions.clock)
+    while True:
+        text = await _text(websocket)
+        if not allowance.spend():
+            raise Refused(
+                CloseCode.TOO_MANY,
+                protocol.Error("too-many", f"expected at most {most:,} messages a second, found more"),
+            )
+        yield text
+
+
 async def _text(websocket: WebSocket) -> str:
     message = await websocket.receive()
     if message["type"] == "websocket.disconnect":
@@ -257,13 +280,17 @@ def _authorization(websocket: WebSocket) -> str | None:
     return websocket.headers.get("authorization")
 
 
-def _check_token(websocket: WebSocket, hello: protocol.Hello) -> None:
-    """Refuse a client that shows the token neither in its header nor in its first message."""
+def _check_token(websocket: WebSocket, hello: protocol.Hello, right: Right) -> frozenset[Right]:
+    """Refuse a client that shows no fitting token, neither in its header nor in its first message; else its rights."""
+    settings = websocket.app.state.desk.studio.settings
     shown = _authorization(websocket)
     if shown is None and hello.token is not None:
         shown = f"Bearer {hello.token}"
-    if refused := token_refusal(websocket.app.state.desk.studio.settings, shown):
+    if refused := right_refusal(settings, shown, right):
         raise Refused(CloseCode.TOKEN, protocol.Error("token-needed", f"{refused}, or say hello with it first"))
+    rights = rights_of(settings, shown)
+    assert not isinstance(rights, str)
+    return rights
 
 
 def _reason(text: str) -> str:

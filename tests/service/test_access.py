@@ -8,10 +8,12 @@ import httpx
 import pytest
 from starlette.datastructures import Headers
 
-from service.access import host_refusal, origin_refusal, token_refusal
+from service.access import EVERY_RIGHT, Right, host_refusal, origin_refusal, right_refusal, rights_of
 from service.settings import Settings
 
 TOKEN = "correct-horse-battery"
+VIEW_TOKEN = "only-to-look-at"
+GAZE_TOKEN = "only-to-be-a-gaze"
 GAZE = {"gaze_x": 1, "gaze_y": 2, "width_px": 32, "height_px": 18}
 
 LOOPBACK = Settings()
@@ -90,8 +92,26 @@ def test_origins(headers: dict[str, str], welcome: bool) -> None:
     ],
 )
 def test_tokens(authorization: str | None, welcome: bool) -> None:
-    assert (token_refusal(Settings(token=TOKEN), authorization) is None) == welcome
-    assert token_refusal(Settings(), authorization) is None
+    assert (right_refusal(Settings(token=TOKEN), authorization, Right.VIEW) is None) == welcome
+    assert right_refusal(Settings(), authorization, Right.GAZE) is None
+
+
+def test_each_token_has_its_rights() -> None:
+    settings = Settings(token=TOKEN, view_token=VIEW_TOKEN, gaze_token=GAZE_TOKEN)
+    assert rights_of(settings, f"Bearer {TOKEN}") == EVERY_RIGHT
+    assert rights_of(settings, f"Bearer {VIEW_TOKEN}") == {Right.VIEW}
+    assert rights_of(settings, f"Bearer {GAZE_TOKEN}") == {Right.GAZE}
+    for shown in (f"Basic {TOKEN}", f"Bearer {VIEW_TOKEN}{GAZE_TOKEN}", "Bearer ", None):
+        assert isinstance(rights_of(settings, shown), str)
+
+
+def test_who_may_only_be_a_gaze_gets_no_frame(client_of: Callable[[Settings], httpx.Client]) -> None:
+    client = client_of(Settings(port=0, token=TOKEN, view_token=VIEW_TOKEN, gaze_token=GAZE_TOKEN))
+    refused = client.get("/v1/scenes", headers={"Authorization": f"Bearer {GAZE_TOKEN}"})
+    assert refused.status_code == 403
+    assert 'error="insufficient_scope"' in refused.headers["www-authenticate"]
+    assert refused.json()["detail"] == "this token does not entitle to look at frames"
+    assert client.get("/v1/scenes", headers={"Authorization": f"Bearer {VIEW_TOKEN}"}).status_code == 200
 
 
 def test_with_a_token_all_but_health_and_the_page_asks_for_it(client_of: Callable[[Settings], httpx.Client]) -> None:

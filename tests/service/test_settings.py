@@ -6,6 +6,7 @@ from dataclasses import fields
 from pathlib import Path
 
 import pytest
+import trustme
 
 from renderer.errors import SettingsError
 from service.settings import Settings, is_loopback
@@ -14,6 +15,8 @@ STATED = {
     "host": ("0.0.0.0", "0.0.0.0"),
     "port": ("9000", 9000),
     "token": ("a-long-token", "a-long-token"),
+    "view_token": ("another-token", "another-token"),
+    "gaze_token": ("a-third-token", "a-third-token"),
     "insecure": ("yes", True),
     "threads": ("3", 3),
     "max_pixels": ("1000", 1000),
@@ -21,11 +24,15 @@ STATED = {
     "max_depth": ("2", 2),
     "max_camera_rays": ("5000", 5000),
     "max_body_bytes": ("512", 512),
+    "max_header_bytes": ("4096", 4096),
+    "max_connections": ("4", 4),
+    "client_timeout_s": ("3", 3),
     "max_concurrent_renders": ("2", 2),
     "max_queued_renders": ("0", 0),
     "max_sessions": ("2", 2),
     "max_viewers": ("3", 3),
     "max_message_bytes": ("2048", 2048),
+    "max_messages_per_s": ("100", 100),
     "session_expiry_s": ("0", 0),
     "map_cache_bytes": ("1", 1),
     "store_bytes": ("2", 2),
@@ -37,12 +44,16 @@ STATED = {
 
 def test_every_field_has_a_variable(tmp_path: Path) -> None:
     environ = {f"GAZETRACE_{name.upper()}": text for name, (text, _) in STATED.items()}
-    environ["GAZETRACE_SCENES"] = str(tmp_path)
+    certfile = tmp_path / "service.pem"
+    trustme.CA().issue_cert("localhost").private_key_and_cert_chain_pem.write_to_path(str(certfile))
+    paths = {"scenes": tmp_path, "certfile": certfile, "keyfile": certfile}
+    environ |= {f"GAZETRACE_{name.upper()}": str(path) for name, path in paths.items()}
     settings = Settings.from_environment(environ)
-    assert {field.name for field in fields(Settings)} == {*STATED, "scenes"}
+    assert {field.name for field in fields(Settings)} == {*STATED, *paths}
     for name, (_, value) in STATED.items():
         assert getattr(settings, name) == value, name
-    assert settings.scenes == tmp_path
+    for name, path in paths.items():
+        assert getattr(settings, name) == path
 
 
 def test_empty_and_foreign_variables_state_nothing() -> None:
@@ -62,6 +73,14 @@ def test_empty_and_foreign_variables_state_nothing() -> None:
         ("GAZETRACE_MAX_DEPTH", "65"),
         ("GAZETRACE_MAX_CAMERA_RAYS", "1e6"),
         ("GAZETRACE_MAX_BODY_BYTES", "0"),
+        ("GAZETRACE_MAX_HEADER_BYTES", "1023"),
+        ("GAZETRACE_MAX_CONNECTIONS", "0"),
+        ("GAZETRACE_CLIENT_TIMEOUT_S", "0"),
+        ("GAZETRACE_MAX_MESSAGES_PER_S", "0"),
+        ("GAZETRACE_CERTFILE", "/no/such/file"),
+        ("GAZETRACE_CERTFILE", __file__),
+        ("GAZETRACE_KEYFILE", __file__),
+        ("GAZETRACE_VIEW_TOKEN", "no-token-beside-it"),
         ("GAZETRACE_MAX_CONCURRENT_RENDERS", "0"),
         ("GAZETRACE_MAX_QUEUED_RENDERS", "-1"),
         ("GAZETRACE_MAX_SESSIONS", "0"),
@@ -107,3 +126,9 @@ def test_the_token_is_not_shown() -> None:
     with pytest.raises(SettingsError) as raised:
         Settings(token="tiny")
     assert "tiny" not in str(raised.value)
+
+
+def test_tokens_differ() -> None:
+    for more in ({"view_token": "a-long-token"}, {"view_token": "another-one", "gaze_token": "another-one"}):
+        with pytest.raises(SettingsError, match="differ"):
+            Settings(token="a-long-token", **more)

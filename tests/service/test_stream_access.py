@@ -16,6 +16,8 @@ from tests.service.conftest import serving
 from tests.service.streaming import Clock, Peer, configure, peer, sessions, source, viewer
 
 TOKEN = "correct-horse-battery"
+VIEW_TOKEN = "only-to-look-at"
+GAZE_TOKEN = "only-to-be-a-gaze"
 DECODE = protocol.decode_stream_down
 
 
@@ -128,6 +130,46 @@ def test_the_token_is_in_a_header_or_in_the_first_message(renderer: Renderer) ->
         assert httpx.get(f"{address}/v1/sessions").status_code == 401
         listed = httpx.get(f"{address}/v1/sessions", headers=right["additional_headers"])
         assert [session["session"] for session in listed.json()["sessions"]][-1] == "fed"
+
+
+def test_rights_to_look_and_to_be_a_gaze_are_apart(renderer: Renderer) -> None:
+    settings = Settings(port=0, token=TOKEN, view_token=VIEW_TOKEN, gaze_token=GAZE_TOKEN)
+    with serving(settings, renderer) as address:
+        with viewer(address, "shared", token=GAZE_TOKEN) as found:
+            assert refused(found)[0] == CloseCode.TOKEN
+        with source(address, "shared") as found:
+            found.say(Hello(VIEW_TOKEN))
+            assert refused(found)[0] == CloseCode.TOKEN
+        with viewer(address, "shared", token=VIEW_TOKEN) as found, source(address, "shared") as gaze:
+            gaze.say(Hello(GAZE_TOKEN))
+            gaze.next(Ready)
+            found.say(configure())
+            found.final()
+            gaze.say(protocol.Gaze(1.0, 2.0))
+            assert found.final().header.gaze.x == 1.0
+            found.say(protocol.Gaze(3.0, 4.0))
+            code, error = refused(found)
+            assert (code, error.field) == (CloseCode.PROTOCOL, "type")
+            assert "be a gaze" in error.message
+
+
+@pytest.mark.parametrize("path", ["/v1/stream", "/v1/gaze?session=chatty"])
+def test_who_says_too_much_is_sent_away(renderer: Renderer, path: str) -> None:
+    clock = Clock()
+    with (
+        serving(Settings(port=0, max_messages_per_s=20), renderer, clock=clock) as address,
+        peer(address, path, DECODE) as found,
+    ):
+        for _ in range(3):
+            for number in range(19):
+                found.say(protocol.Ping(number, 0))
+            found.next(protocol.Pong, lambda pong: pong.id == 18)
+            clock.advance(1)
+        for number in range(21):
+            found.say(protocol.Ping(number, 0))
+        code, error = refused(found)
+        assert (code, error.code) == (CloseCode.TOO_MANY, "too-many")
+        assert "20 messages a second" in error.message
 
 
 def test_who_says_nothing_is_sent_away(address: str, monkeypatch: pytest.MonkeyPatch) -> None:

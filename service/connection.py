@@ -1,0 +1,98 @@
+"""A client's HTTP connection, with an end to its time: whoever sends or reads too slowly makes room for others."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+import struct
+from http import HTTPStatus
+
+from starlette.responses import Response
+from uvicorn.protocols.http.h11_impl import H11Protocol
+
+from service.headers import SECURITY_HEADERS
+from service.problem import RETRY_AFTER_S, problem
+from service.settings import Settings
+
+
+class Connection(H11Protocol):
+    """uvicorn's connection, closed when a request is not whole, or a reply not taken, in time.
+
+    Attributes:
+        settings: how many connections there may be, and how long a client may take.
+    """
+
+    settings: Settings
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        """Give the client its time, or send it away if there are too many."""
+        self._request_timer: asyncio.TimerHandle | None = None
+        self._reply_timer: asyncio.TimerHandle | None = None
+        super().connection_made(transport)
+        if len(self.connections) > self.settings.max_connections:
+            detail = f"this service has its {self.settings.max_connections} connections already"
+            self._end(problem(503, detail, "too-many", headers={"Retry-After": str(RETRY_AFTER_S)}))
+        else:
+            self._await_request()
+
+    def data_received(self, data: bytes) -> None:
+        """Take what came; the time runs until the request is whole."""
+        super().data_received(data)
+        if self.transport.get_protocol() is not self or not self._lacks_request():
+            _cancel(self._request_timer)
+            self._request_timer = None
+        elif self._request_timer is None:
+            self._await_request()
+
+    def pause_writing(self) -> None:
+        """The client reads slowly: it has so long to go on."""
+        super().pause_writing()
+        self._reply_timer = self.loop.call_later(self.settings.client_timeout_s, self._drop)
+
+    def resume_writing(self) -> None:
+        """It goes on."""
+        _cancel(self._reply_timer)
+        super().resume_writing()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Forget the client."""
+        _cancel(self._request_timer)
+        _cancel(self._reply_timer)
+        super().connection_lost(exc)
+
+    def _await_request(self) -> None:
+        self._request_timer = self.loop.call_later(self.settings.client_timeout_s, self._give_up)
+
+    def _lacks_request(self) -> bool:
+        return self.cycle is None or self.cycle.response_complete or self.cycle.more_body
+
+    def _give_up(self) -> None:
+        """The request is not whole; an answer only makes sense where none has begun."""
+        answered = self.cycle is not None and self.cycle.response_started and not self.cycle.response_complete
+        detail = f"expected a whole request within {self.settings.client_timeout_s} s"
+        self._end(None if answered else problem(HTTPStatus.REQUEST_TIMEOUT, detail, "request-timeout"))
+
+    def _drop(self) -> None:
+        """End the connection and forget what the kernel has still to send: it would keep that for minutes."""
+        at_once = struct.pack("ii", 1, 0)
+        self.transport.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, at_once)
+        self.transport.abort()
+
+    def _end(self, reply: Response | None) -> None:
+        if reply is not None and not self.transport.is_closing():
+            status = HTTPStatus(reply.status_code)
+            lines = [b"HTTP/1.1 %d %s" % (status, status.phrase.encode()), b"connection: close"]
+            lines += [b"%s: %s" % header for header in reply.raw_headers]
+            lines += [f"{name}: {value}".encode() for name, value in SECURITY_HEADERS.items()]
+            self.transport.write(b"\r\n".join([*lines, b"", bytes(reply.body)]))
+        self.transport.close()
+
+
+def connection_of(settings: Settings) -> type[Connection]:
+    """The class of a service's connections."""
+    return type("Connection", (Connection,), {"settings": settings})
+
+
+def _cancel(timer: asyncio.TimerHandle | None) -> None:
+    if timer is not None:
+        timer.cancel()
