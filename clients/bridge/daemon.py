@@ -214,6 +214,10 @@ class Bridge:
         link = self.link
         if link is None or link.state is not ServiceState.READY:
             return
+        if not link.viewers:
+            page = f"{self.config.service}/?session={self.config.session}"
+            self._log.say_once("calibration", f"waiting for somebody to open {page}: the targets are shown there")
+            return
         if not walk.step(gaze.received_ns, gaze.measured):
             return
         count = len(walk.targets)

@@ -83,6 +83,7 @@ class ServiceLink:
         ping_s: time between signs of life; after two without an answer the other end is taken for gone.
 
     Attributes:
+        viewers: how many the session has.
         latencies_ns: from a sample's last byte to the end of its sending, since somebody last emptied it.
     """
 
@@ -110,6 +111,7 @@ class ServiceLink:
         self.state = ServiceState.STOPPED
         self.connections = 0
         self.sent = 0
+        self.viewers = 0
         self.latencies_ns: deque[int] = deque(maxlen=LATENCIES)
 
     def filled(self) -> None:
@@ -171,6 +173,7 @@ class ServiceLink:
             self._become(ServiceState.ABSENT, f"{self._url}: {error or type(error).__name__}")
         finally:
             self._ready.clear()
+            self.viewers = 0
             self._outbox.clear()
             self._slot.clear()
 
@@ -222,10 +225,10 @@ class ServiceLink:
             case protocol.Pong(client_time_ns=sent_ns, service_time_ns=service_ns):
                 self.clock.answered(sent_ns, service_ns, received_ns)
                 self._backoff.good(received_ns)
+            case protocol.Status(viewers=viewers):
+                self.viewers = viewers
             case protocol.Error(message=said):
                 self._listeners.message(said)
-            case _:
-                pass
 
     async def _send(self, connection: ClientConnection) -> None:
         """Send whatever waits as soon as the connection takes it."""

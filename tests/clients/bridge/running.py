@@ -94,6 +94,7 @@ class Listener:
         self.closes = News()
         self.port = 0
         self.display: dict[str, float] | None = DISPLAY
+        self.viewers = 1
         self._stack = ExitStack()
         self._connections: list[ServerConnection] = []
 
@@ -121,6 +122,7 @@ class Listener:
         self._connections.append(connection)
         ready = protocol.Ready("main", 1, "matte", self.display, None, (), 0)
         connection.send(protocol.encode(ready))
+        connection.send(protocol.encode(protocol.Status(0, 0, 0, 0, self.viewers, 1, "none")))
         self.heard.add(("path", connection.request.path if connection.request else ""))
         try:
             while True:

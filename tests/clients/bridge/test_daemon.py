@@ -221,6 +221,8 @@ def test_calibration_walks_the_viewers_through_nine_points(
         while not stop.wait(0.001):
             targets = [item for item in service.heard.items if isinstance(item, protocol.Target)]
             if targets and targets[-1].x is not None and targets[-1].y is not None:
+                if targets[-1].index != walk.index:  # the next target is on its way
+                    continue
                 terminal.write(f"{200 + 300 * targets[-1].x},{90 + 100 * targets[-1].y}\n".encode())
             else:
                 terminal.write(b"350,140\n")
@@ -246,6 +248,16 @@ def test_calibration_walks_the_viewers_through_nine_points(
     assert calibration.apply(Point(350, 140)) == pytest.approx((0.5, 0.5), abs=0.02)
     with running(config(terminal, service, protocol="csv", unit="raw", calibration=file)) as found:
         service.heard.until(lambda items: sum(isinstance(item, protocol.Margin) for item in items) >= 2)
+
+
+def test_no_target_is_shown_before_somebody_can_see_it(terminal: Terminal, service: Listener, tmp_path: Path) -> None:
+    service.viewers = 0
+    settings = config(terminal, service, session="lab")
+    with running(settings, None, NewCalibration(tmp_path / "lab.json")) as found:
+        found.says("service", "ready")
+        with looking(terminal):
+            found.says("calibration", f"waiting for somebody to open {service.url}/?session=lab")
+    assert not [item for item in service.heard.items if isinstance(item, protocol.Target)]
 
 
 def test_the_margin_is_told_before_anybody_has_configured_the_session(
