@@ -1,14 +1,12 @@
-"""From raw gaze to something worth rendering for: holds through blinks, knows saccades, does not flicker.
+"""From raw gaze to something worth rendering for: holds through blinks, knows saccades.
 
 Pure functions of what was known, what came in, and the time.
 """
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 
-from renderer.gaze import Gaze, GazeBucket, bucket_of
 from service import protocol
 from service.protocol import GazeState
 
@@ -19,9 +17,6 @@ HOLD_NS = 600 * NS_PER_MS
 
 LONGEST_SACCADE_NS = 150 * NS_PER_MS
 """A saccade whose landing nobody reported has landed by then: 2.2 ms/deg + 21 ms is 109 ms for 40 deg."""
-
-SLACK = 0.25
-"""How far, in sides of a bucket, a gaze may leave its bucket before another takes over."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,39 +61,3 @@ def next_change_ns(attention: Attention) -> int | None:
     if attention.state == "held":
         return attention.since_ns + HOLD_NS
     return attention.received_ns + LONGEST_SACCADE_NS if attention.saccade else None
-
-
-def steady_bucket(before: GazeBucket | None, gaze: Gaze, side_px: int) -> GazeBucket:
-    """The bucket to render for: the one before, until the gaze has left it by more than `slack_px`."""
-    if before is not None and before.side_px == side_px > 0:
-        reach = side_px / 2 + slack_px(side_px)
-        if abs(gaze.x - before.x) <= reach and abs(gaze.y - before.y) <= reach:
-            return before
-    return bucket_of(gaze, side_px)
-
-
-def slack_px(side_px: int) -> float:
-    """How far a gaze may be from the bucket that is rendered for [px]."""
-    return SLACK * side_px
-
-
-def slack_deg(side_px: int, pitch_cm: float, distance_cm: float) -> float:
-    """The largest angle that `slack_px` can be, with pixels of `pitch_cm` (the longer side) [deg].
-
-    In both directions at once, in front of the eye, where it is largest. A map with this margin is fine
-    enough for every gaze that `steady_bucket` keeps.
-    """
-    return math.degrees(math.atan(math.sqrt(2.0) * slack_px(side_px) * pitch_cm / distance_cm))
-
-
-def within(bucket: GazeBucket, gaze: Gaze) -> Gaze:
-    """The point of the bucket nearest to the gaze."""
-    if bucket.side_px == 0:
-        return gaze
-    half = bucket.side_px / 2
-    return Gaze(_clamped(gaze.x, bucket.x, half), _clamped(gaze.y, bucket.y, half))
-
-
-def _clamped(value: float, centre: float, half: float) -> float:
-    """`value` in the half-open interval of a bucket."""
-    return min(max(value, centre - half), math.nextafter(centre + half, -math.inf))

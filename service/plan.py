@@ -9,7 +9,8 @@ from renderer.frame import FrameCost, FrameRequest
 from renderer.gaze import Gaze, GazeBucket
 from renderer.prepared import PreparedScene
 from renderer.quality import Quality
-from service.conditioning import Attention, slack_deg, steady_bucket, within
+from renderer.steady_gaze import slack_deg, steady_bucket, within
+from service.conditioning import Attention
 from service.protocol import FramePhase
 from service.rendering import Order
 from service.request import StreamBody, gaze_on
