@@ -82,7 +82,7 @@ class Device:
 
     def run(self) -> None:
         """The thread's work."""
-        why = "stopped"
+        why = "as asked"
         try:
             while not self._stop.is_set():
                 self.beat_ns = time.monotonic_ns()

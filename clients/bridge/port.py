@@ -180,6 +180,12 @@ def listed_ports() -> list[ListedPort]:
     """The serial ports of this machine, with the names that survive a replug where there are any."""
     by_id = {link.resolve(): str(link) for link in Path("/dev/serial/by-id").glob("*")}
     return [
-        ListedPort(port.device, f"{port.description} [{port.hwid}]", by_id.get(Path(port.device).resolve()))
+        ListedPort(port.device, _described(port.description, port.hwid), by_id.get(Path(port.device).resolve()))
         for port in sorted(list_ports.comports())
     ]
+
+
+def _described(description: str, hardware: str) -> str:
+    """What is known of a port; pyserial writes n/a where that is nothing."""
+    known = [text for text in (description, f"[{hardware}]") if "n/a" not in text]
+    return " ".join(known) or "(no description)"

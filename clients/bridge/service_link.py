@@ -139,7 +139,7 @@ class ServiceLink:
                 await self._visit()
                 await asyncio.sleep(self._backoff.wait_s())
         finally:
-            self._become(ServiceState.STOPPED, "stopped")
+            self._become(ServiceState.STOPPED, "as asked")
 
     async def _visit(self) -> None:
         """One connection, from its beginning to its end."""
@@ -169,6 +169,8 @@ class ServiceLink:
             )
         except websockets.ConnectionClosed as error:
             self._lost(error)
+        except ConnectionRefusedError:
+            self._become(ServiceState.ABSENT, f"{self._url}: nobody listens there: is the service running?")
         except (OSError, TimeoutError, websockets.WebSocketException) as error:
             self._become(ServiceState.ABSENT, f"{self._url}: {error or type(error).__name__}")
         finally:

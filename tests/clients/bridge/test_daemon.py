@@ -9,7 +9,7 @@ import socket
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -108,7 +108,7 @@ def test_the_service_may_come_late_go_and_return(terminal: Terminal) -> None:
     with socket.create_server(("127.0.0.1", 0)) as free:
         service.port = free.getsockname()[1]
     with running(config(terminal, service)) as found:
-        at = found.says("service", "absent")
+        at = found.says("service", f"absent: ws://127.0.0.1:{service.port}/v1/gaze?session=main: nobody listens there")
         terminal.read(len(START))
         with looking(terminal):
             found.says("device", "streaming")
@@ -358,6 +358,37 @@ def test_systemd_is_told(
     notify("READY=1", os.environ)
     assert watchdog_interval_s({"WATCHDOG_USEC": "10000000"}) == 5
     assert watchdog_interval_s({}) is None
+
+
+def test_a_loop_that_is_stuck_tells_systemd_nothing_until_it_goes_on(
+    terminal: Terminal, service: Listener, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as systemd:
+        systemd.bind(str(tmp_path / "notify"))
+        monkeypatch.setenv("NOTIFY_SOCKET", str(tmp_path / "notify"))
+        monkeypatch.setenv("WATCHDOG_USEC", "40000")
+        stuck, go_on = threading.Event(), threading.Event()
+
+        def block() -> None:
+            stuck.set()
+            go_on.wait(PATIENCE_S)
+
+        with running(config(terminal, service)) as found:
+            systemd.settimeout(PATIENCE_S)
+            while systemd.recv(100) != b"WATCHDOG=1":
+                pass
+            found.bridge._call(block)
+            assert stuck.wait(PATIENCE_S)
+            systemd.settimeout(0)
+            with suppress(BlockingIOError):
+                while systemd.recv(100):
+                    pass
+            systemd.settimeout(0.5)  # more than ten intervals
+            with pytest.raises(TimeoutError):
+                systemd.recv(100)
+            go_on.set()
+            systemd.settimeout(PATIENCE_S)
+            assert systemd.recv(100) == b"WATCHDOG=1"
 
 
 @pytest.mark.parametrize("address", ["ftp://here", "localhost:8321", ""])
