@@ -6,6 +6,7 @@ black or too faint to change a pixel, a texture that nothing looks up call for n
 
 from __future__ import annotations
 
+import dataclasses
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -14,7 +15,7 @@ import numpy as np
 
 from renderer.effect_choice import EFFECTS, EffectChoice
 from renderer.light_reach import reaching_lights
-from renderer.scene import BLACK, Light, Material, Mesh, PointLight, RectangleLight, Scene, SphereLight, Texture
+from renderer.scene import BLACK, WHITE, Light, Material, Mesh, PointLight, RectangleLight, Scene, SphereLight, Texture
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +51,7 @@ class EffectPlan:
 
 def plan_effects(scene: Scene) -> EffectPlan:
     """What `scene` calls for, with the reason of each effect."""
+    scene = without_unseen(scene)
     users = _material_users(scene)
     lights = reaching_lights(scene)
     casting: dict[str, list[Light]] = {
@@ -160,7 +162,28 @@ def _shows_its_normal(material: Material, lit: bool, scene: Scene) -> bool:
 
 def is_boundary(material: Material) -> bool:
     """Whether Fresnel's equations mirror a part of the light (not where the index stays the same)."""
-    return material.transmission != BLACK and material.ior != 1.0
+    return material.transmission != BLACK and (material.ior != 1.0 or material.priority is not None)
+
+
+def without_unseen(scene: Scene) -> Scene:
+    """`scene` without what nothing is seen of: it lets all light through, unbent, and adds none; nor shades anything.
+
+    Left in it would cost rays, and these would start anew behind it, rounded.
+    """
+    meshes = tuple(mesh for mesh in scene.meshes if not _is_unseen(mesh.material))
+    spheres = tuple(sphere for sphere in scene.spheres if not _is_unseen(sphere.material))
+    return (
+        scene
+        if len(meshes) + len(spheres) == len(scene.meshes) + len(scene.spheres)
+        else (dataclasses.replace(scene, meshes=meshes, spheres=spheres))
+    )
+
+
+def _is_unseen(material: Material) -> bool:
+    """Whether a surface of it changes nothing for any ray."""
+    added = (material.diffuse, material.specular, material.reflection, material.emission)
+    clear = material.transmission == WHITE and material.ior == 1.0 and material.priority is None
+    return clear and material.base == "phong" and all(share == BLACK for share in added)
 
 
 def _named_lights(lights: Sequence[Light]) -> str:

@@ -52,6 +52,12 @@ class Intersector:
         other._sphere_casts = len(self._spheres.radius) > 0
         return other
 
+    def without_lights(self) -> Intersector:
+        """The same, but blind to area lights."""
+        other = copy.copy(self)
+        other._area_lights = self._area_lights[:0]
+        return other
+
     def nearest(self, origin: NDArray[np.float32], direction: NDArray[np.float32]) -> Hits:
         """Nearest hit of each ray.
 

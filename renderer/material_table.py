@@ -37,9 +37,11 @@ MATERIAL = np.dtype(
         ("normal_scale", np.float32),
         *((name, np.int32) for name in ("picture", "specular_picture", "alpha_picture", "normal_picture")),
         ("calls", np.int32),
+        ("medium", np.int32),
     ]
 )
-"""One material as the kernels read it; pictures are -1 without a texture, `calls` are the bits above."""
+"""One material as the kernels read it; pictures are -1 without a texture, `calls` are the bits above,
+`medium` is its number as a medium, 0 for none."""
 
 
 def used_materials(scene: Scene) -> list[Material]:
@@ -57,11 +59,14 @@ def readings_of(material: Material, plan: EffectPlan) -> list[Reading]:
     return readings
 
 
-def material_table(materials: list[Material], picture: dict[Reading, int], plan: EffectPlan) -> NDArray[np.void]:
+def material_table(
+    materials: list[Material], media: list[Material], picture: dict[Reading, int], plan: EffectPlan
+) -> NDArray[np.void]:
     """(k,) MATERIAL.
 
     Args:
         materials: k of them.
+        media: those of them that are media, by rank.
         picture: rows of the atlas, of all that is looked up.
         plan: what runs.
     """
@@ -82,6 +87,7 @@ def material_table(materials: list[Material], picture: dict[Reading, int], plan:
             reading = Reading(texture, normals=name == "normal_picture") if texture else None
             table[row][name] = picture.get(reading, -1) if reading else -1
         table[row]["calls"] = calls_of(material, plan)
+        table[row]["medium"] = media.index(material) + 1 if material in media else 0
     return table
 
 

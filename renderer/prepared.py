@@ -21,12 +21,14 @@ from renderer.area_light import area_light_table
 from renderer.atlas import TextureAtlas, build_atlas
 from renderer.direction import unit
 from renderer.effect_choice import EffectChoice
-from renderer.effects import EffectPlan, plan_effects
+from renderer.effects import EffectPlan, plan_effects, without_unseen
 from renderer.errors import SceneError
 from renderer.intersection import Intersector
 from renderer.light_reach import reaching_lights
 from renderer.material_table import GRAINED, material_table, readings_of, used_materials
+from renderer.media import distinct_spheres, indices_of, rank_media
 from renderer.scene import Material, Mesh, PointLight, Scene, Sphere
+from renderer.shared_face import join_faces, mixed_bits
 from renderer.sphere import SphereTree, build_sphere_tree
 from renderer.tangent import TANGENT, mesh_tangents
 
@@ -38,6 +40,7 @@ SMOOTH_COLUMN = 25
 NORMAL_COLUMN = 26
 REACH_COLUMN = 29
 DENSITY_COLUMN = 30
+OTHER_COLUMN = 31
 
 LIGHT = np.dtype([*((name, np.float64) for name in ("x", "y", "z", "red", "green", "blue")), ("casts", np.int64)])
 """One point light in scene units; `casts` is 1 where shadow rays are to be traced."""
@@ -49,8 +52,8 @@ class Surfaces(NamedTuple):
     Attributes:
         facets: (m, FACET) float32, one triangle each, in two cache lines: for each of its three corners
             position, unit normal and texture coordinates; then the row of its material, 1 where the
-            corner normals are not the triangle's own, its own unit normal, its largest coordinate, and its
-            texture coordinates per scene unit.
+            corner normals are not the triangle's own, its own unit normal, its largest coordinate, its
+            texture coordinates per scene unit, and the medium of a second solid that it bounds, see `shared_face`.
         tangents: (m, TANGENT) float32, see `tangent`; (0, TANGENT) where no material is grained or
             has a normal map that shows.
         spheres: analytic spheres.
@@ -59,6 +62,7 @@ class Surfaces(NamedTuple):
         area_lights: (a,) AREA_LIGHT, each light with a size that shines.
         surroundings: (3, 3) float64 radiance at the zenith, at the horizon, and from everywhere.
         textures: pictures.
+        indices: (m + 1,) float64 index of refraction of air and of each medium by number, see `media`.
     """
 
     facets: NDArray[np.float32]
@@ -69,6 +73,7 @@ class Surfaces(NamedTuple):
     area_lights: NDArray[np.void]
     surroundings: NDArray[np.float64]
     textures: TextureAtlas
+    indices: NDArray[np.float64]
 
 
 class Sieve(NamedTuple):
@@ -88,7 +93,7 @@ class PreparedScene:
     """A scene ready to be traced.
 
     Attributes:
-        scene: as its author stated it.
+        scene: as its author stated it, but for what cannot be seen.
         plan: the effects it calls for.
         center: (3,) float64 world position of the scene-unit origin [m].
         scale: scene units per metre, a power of two.
@@ -124,19 +129,24 @@ def prepare(scene: Scene) -> PreparedScene:
     Raises:
         SceneError: where it is too far spread out for float32.
     """
+    scene = without_unseen(scene)
     plan = plan_effects(scene)
     center, scale = _centre_and_scale(scene)
     materials = used_materials(scene)
     readings = itertools.chain(*(readings_of(material, plan) for material in materials))
     atlas, picture = build_atlas(list(dict.fromkeys(readings)))
     row = {material: index for index, material in enumerate(materials)}
-    table = material_table(materials, picture, plan)
+    media = rank_media(materials)
+    table = material_table(materials, media, picture, plan)
     directed = (table["calls"] & GRAINED != 0) | (table["normal_picture"] >= 0)
-    vertices, faces, facets, tangents, casts = _triangles(scene, row, directed, center, scale)
+    vertices, faces, facets, tangents, casts = _triangles(scene, row, table["medium"], directed, center, scale)
     pierced = table["alpha_picture"] >= 0
     whole = ~pierced[facets[:, MATERIAL_COLUMN].astype(np.int64)]
     spheres = _sphere_tree(
-        [dataclasses.replace(s, casts_shadows=s.casts_shadows and not pierced[row[s.material]]) for s in scene.spheres],
+        [
+            dataclasses.replace(s, casts_shadows=s.casts_shadows and not pierced[row[s.material]])
+            for s in distinct_spheres(scene.spheres, media)
+        ],
         row, center, scale,
     )  # fmt: skip
     lights = reaching_lights(scene)
@@ -152,6 +162,7 @@ def prepare(scene: Scene) -> PreparedScene:
         surroundings=np.array(
             [scene.surroundings.zenith, scene.surroundings.horizon, scene.surroundings.ambient], dtype=np.float64
         ),
+        indices=indices_of(media),
     )
     intersector = Intersector(vertices, faces, casts & whole, spheres, surfaces.area_lights)
     sieved = _sphere_tree(
@@ -236,13 +247,19 @@ _Triangles = tuple[NDArray[np.float32], NDArray[np.int32], NDArray[np.float32], 
 
 
 def _triangles(
-    scene: Scene, row: dict[Material, int], directed: NDArray[np.bool_], center: NDArray[np.float64], scale: float
+    scene: Scene,
+    row: dict[Material, int],
+    medium: NDArray[np.int32],
+    directed: NDArray[np.bool_],
+    center: NDArray[np.float64],
+    scale: float,
 ) -> _Triangles:
     """Vertices, faces, facets, tangents and shadow flags of all meshes together.
 
     Args:
         scene: with the meshes.
         row: of each material in the material table.
+        medium: (k,) int32 column of the material table.
         directed: (k,) bool rows of the material table that need tangents.
         center, scale: of the scene's units.
     """
@@ -268,6 +285,8 @@ def _triangles(
     if first_vertex > np.iinfo(np.int32).max:
         raise SceneError(f"{scene.title or 'scene'}: expected fewer than 2^31 vertices, found {first_vertex}")
     keep = _distinct(facets)
+    if medium.any():
+        keep = _shared(facets, keep, medium)
     if len(keep) < len(facets):
         kept = aligned_facets(len(keep))
         kept[:] = facets[keep]
@@ -331,18 +350,17 @@ def _distinct(facets: NDArray[np.float32]) -> NDArray[np.int64]:
     area = np.cross(wide[:, 1] - wide[:, 0], wide[:, 2] - wide[:, 0])
     solid = np.flatnonzero((area != 0.0).any(axis=1))
     flat = positions[solid].reshape(len(solid), 9) + np.float32(0.0)
-    mixed = np.sort(_mixed_bits(flat))
+    mixed = np.sort(mixed_bits(flat))
     if not (mixed[1:] == mixed[:-1]).any():
         return solid
     _, first = np.unique(flat, axis=0, return_index=True)
     return np.asarray(solid[np.sort(first)])
 
 
-def _mixed_bits(flat: NDArray[np.float32]) -> NDArray[np.uint64]:
-    """A 64-bit hash of each row of (n, 9) float32 numbers."""
-    words = flat.view(np.uint32)
-    mixed = np.zeros(len(words), dtype=np.uint64)
-    for column in range(9):
-        mixed = (mixed ^ words[:, column]) * np.uint64(0x9E3779B97F4A7C15)
-        mixed ^= mixed >> np.uint64(29)
-    return mixed
+def _shared(facets: NDArray[np.float32], rows: NDArray[np.int64], medium: NDArray[np.int32]) -> NDArray[np.int64]:
+    """Those of `rows` to keep where solids share faces; the kept ones get to know whose faces they stand for."""
+    corners = facets[rows, :MATERIAL_COLUMN].reshape(-1, 3, 8)[:, :, :3]
+    normals = facets[rows, NORMAL_COLUMN : NORMAL_COLUMN + 3]
+    keep, other = join_faces(corners, normals, medium[facets[rows, MATERIAL_COLUMN].astype(np.int64)].astype(np.int64))
+    facets[rows, OTHER_COLUMN] = other
+    return np.asarray(rows[keep])

@@ -16,6 +16,7 @@ class Rays(NamedTuple):
         weight: (n, 3) float32 share of what the ray sees that reaches the eye.
         sample: (n,) int32 camera sample of the block it belongs to; rising along the array.
         pencil: (n, 2) float32 its width at the origin, and what it gains per scene unit; see `footprint`.
+        around: (n,) int64 the media it is in, see `media`; only in scenes that have some.
     """
 
     origin: NDArray[np.float32]
@@ -23,6 +24,7 @@ class Rays(NamedTuple):
     weight: NDArray[np.float32]
     sample: NDArray[np.int32]
     pencil: NDArray[np.float32]
+    around: NDArray[np.int64]
 
 
 class ShadowRays(NamedTuple):
@@ -58,7 +60,14 @@ class Hits(NamedTuple):
 def some_rays(rays: Rays, start: int, stop: int) -> Rays:
     """Rays start .. stop - 1, without a copy."""
     part = slice(start, stop)
-    return Rays(rays.origin[part], rays.direction[part], rays.weight[part], rays.sample[part], rays.pencil[part])
+    return Rays(
+        rays.origin[part],
+        rays.direction[part],
+        rays.weight[part],
+        rays.sample[part],
+        rays.pencil[part],
+        rays.around[part],
+    )
 
 
 def first_shadow_rays(rays: ShadowRays, count: int) -> ShadowRays:
@@ -76,6 +85,7 @@ def make_rays(capacity: int) -> Rays:
         weight=np.zeros((capacity, 3), dtype=np.float32),
         sample=np.zeros(capacity, dtype=np.int32),
         pencil=np.zeros((capacity, 2), dtype=np.float32),
+        around=np.zeros(capacity, dtype=np.int64),
     )
 
 

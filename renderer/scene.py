@@ -13,11 +13,12 @@ from numpy.typing import NDArray
 
 from renderer.camera import Camera
 from renderer.camera_path import CameraPath
-from renderer.errors import SceneError, SettingsError, require_choice, require_number, require_point
+from renderer.errors import SceneError, SettingsError, require_choice, require_integer, require_number, require_point
 
 Rgb = tuple[float, float, float]
 
 BLACK: Rgb = (0.0, 0.0, 0.0)
+WHITE: Rgb = (1.0, 1.0, 1.0)
 
 MAX_COORDINATE_M = 1e12
 """Largest coordinate of a scene [m]: beyond, products of three lengths leave float32 (Embree)."""
@@ -30,6 +31,8 @@ MAX_NORMAL_SCALE = 1e3
 
 BASES = ("phong", "ashikhmin-shirley")
 """Models of how a surface scatters light."""
+
+MAX_PRIORITY = 1000
 
 MAX_RADIANCE = 1e12
 """Largest radiance or intensity a scene may state; keeps every product finite in float32."""
@@ -103,6 +106,9 @@ class Material:
         transmission: share let through, 0 to 1 each; above 0 the surface is a dielectric boundary
             whose mirrored share is Fresnel's F and whose transmitted share is (1 - F) * transmission.
         ior: index of refraction inside the surface relative to outside, 0.1 to 10; 1 goes straight through.
+        priority: -1000 to 1000: it is the material of closed solids, made of a medium of index `ior`, that may lie
+            in or overlap others; where they do, the highest priority is what there is, and of equal ones the larger
+            index. None: the surface stands for itself, whatever is around it, as one with holes always does.
         diffuse_texture: multiplies `diffuse`; None for none.
         specular_texture: multiplies `specular` and `reflection`; None for none.
         alpha_texture: cuts holes where its alpha (without alpha: its green) is below `alpha_cutoff`; rays of
@@ -138,6 +144,7 @@ class Material:
     alpha_cutoff: float = 0.5
     normal_texture: Texture | None = None
     normal_scale: float = 1.0
+    priority: int | None = None
 
     def __post_init__(self) -> None:
         where = f"material {self.name!r}"
@@ -157,6 +164,8 @@ class Material:
         ):
             require_number(f"{where}.{label}", exponent, 0.0, MAX_SHININESS)
         require_number(f"{where}.ior", self.ior, 0.1, 10.0)
+        if self.priority is not None:
+            require_integer(f"{where}.priority", self.priority, -MAX_PRIORITY, MAX_PRIORITY)
         require_number(f"{where}.alpha_cutoff", self.alpha_cutoff, 0.0, 1.0)
         require_number(f"{where}.normal_scale", self.normal_scale, -MAX_NORMAL_SCALE, MAX_NORMAL_SCALE)
 

@@ -52,6 +52,7 @@ normal_scale = 1.0                 # or 1: how deep its bumps are
 diffuse = [0.0, 0.0, 0.0]
 transmission = [1.0, 1.0, 1.0]
 ior = 1.5
+priority = 1                       # or none: where solids overlap, the highest counts
 
 [[mesh]]
 file = "vase.obj"                  # OBJ, GLB, glTF, PLY, STL, COLLADA or 3DS
@@ -120,6 +121,7 @@ from renderer.scene import (
     BLACK,
     MAX_COORDINATE_M,
     MAX_NORMAL_SCALE,
+    MAX_PRIORITY,
     MAX_RADIANCE,
     MAX_SHININESS,
     WRAPS,
@@ -229,6 +231,7 @@ class _Reader:
             reflection=fields.rgb("reflection", 1.0, _DEFAULTS.reflection),
             transmission=fields.rgb("transmission", 1.0, _DEFAULTS.transmission),
             ior=fields.number("ior", 0.1, 10.0, _DEFAULTS.ior),
+            priority=fields.integer("priority", -MAX_PRIORITY, MAX_PRIORITY) if "priority" in fields else None,
             diffuse_texture=texture,
             specular_texture=shine,
             alpha_texture=holes,

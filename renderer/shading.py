@@ -24,8 +24,9 @@ from renderer.material_table import (
     REFRACTS_ANYWAY,
     SPAWNS,
 )
+from renderer.media import crossed, dominant
 from renderer.normal_map import bumped, mirroring
-from renderer.prepared import DENSITY_COLUMN, Surfaces
+from renderer.prepared import DENSITY_COLUMN, OTHER_COLUMN, Surfaces
 from renderer.rays import Hits, Rays, ShadowRays
 from renderer.reflectance import even_light
 from renderer.surface import Surface, sphere_surface, triangle_surface, weights_at
@@ -111,6 +112,8 @@ def shade(
     primitive_of, distance = hits.primitive, hits.distance
     child_origin, child_direction = children.origin, children.direction
     child_weight, child_sample = children.weight, children.sample
+    indices, around_of, child_around = surfaces.indices, rays.around, children.around
+    nested = len(indices) > 1
     triangles = len(facets)
     solids = triangles + len(radius)
     counters[:] = 0
@@ -208,8 +211,14 @@ def shade(
         if primitive >= triangles:
             curvature = (1.0 if s.entering else -1.0) / radius[primitive - triangles]
         spread = np.float64(pencil[ray, 1])
+        before = int(around_of[ray]) if nested else 0
+        behind = before
         if material.calls & (BOUNDARY | REFRACTS_ANYWAY) != 0:
             eta = 1.0 / material.ior if s.entering else np.float64(material.ior)
+            if material.medium > 0:
+                other = int(facets[primitive, OTHER_COLUMN]) if primitive < triangles else 0
+                before, behind = crossed(before, int(np.int64(material.medium)), other, s.entering)
+                eta = indices[dominant(before)] / indices[dominant(behind)]
             cosine = -(dx * s.nx + dy * s.ny + dz * s.nz)
             refracted = refracted_cosine(cosine, eta)
             share = fresnel(cosine, refracted, eta)
@@ -233,6 +242,8 @@ def shade(
                 child_sample[n_children] = sample
                 child_pencil[n_children, 0] = width
                 child_pencil[n_children, 1] = refracted_spread(spread, width, curvature, eta)
+                if nested:
+                    child_around[n_children] = behind
                 n_children += 1
                 counters[REFRACTIONS] += 1
         mr, mg, mb = wr * mr, wg * mg, wb * mb
@@ -250,6 +261,8 @@ def shade(
             child_sample[n_children] = sample
             child_pencil[n_children, 0] = width
             child_pencil[n_children, 1] = mirrored_spread(spread, width, curvature)
+            if nested:
+                child_around[n_children] = before
             n_children += 1
             counters[REFLECTIONS] += 1
     counters[CHILDREN] = n_children

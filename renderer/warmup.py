@@ -9,7 +9,7 @@ from renderer.scene import Material, Mesh, PointLight, RectangleLight, Scene, Sp
 
 
 def every_effect() -> Scene:
-    """A textured smooth floor, a mirror and a glass ball, lit by each kind of light with shadows."""
+    """A textured smooth floor, a mirror, a glass ball and ice in water, lit by each kind of light with shadows."""
     checks = Texture(np.array([[[255] * 3, [90] * 3], [[90] * 3, [255] * 3]], dtype=np.uint8), "checks")
     floor = Mesh(
         vertices=np.array([[-9, 0, -9], [9, 0, -9], [9, 0, 9], [-9, 0, 9]], dtype=np.float64),
@@ -25,6 +25,8 @@ def every_effect() -> Scene:
         spheres=(
             Sphere((-1.0, 1.0, 0.0), 1.0, Material("mirror", reflection=(0.8, 0.8, 0.8), base="ashikhmin-shirley")),
             Sphere((1.0, 1.0, 0.0), 1.0, Material("glass", diffuse=(0.0, 0.0, 0.0), transmission=(1.0, 1.0, 1.0))),
+            Sphere((1.0, 1.0, 3.0), 0.5, Material("water", transmission=(1.0, 1.0, 1.0), ior=1.33, priority=0)),
+            Sphere((1.2, 1.0, 3.0), 0.5, Material("ice", transmission=(1.0, 1.0, 1.0), ior=1.31, priority=1)),
         ),
         lights=(
             PointLight((3.0, 8.0, 5.0), (400.0, 400.0, 400.0)),

@@ -14,6 +14,7 @@ from renderer.display import Display
 from renderer.frame import RayCounts
 from renderer.light_samples import LightSamples, seed_samples
 from renderer.lighting import add_unblocked
+from renderer.nested import media_at, pass_hidden
 from renderer.prepared import PreparedScene
 from renderer.quality import Quality
 from renderer.rays import Rays, first_shadow_rays, make_rays, make_shadow_rays, some_rays
@@ -35,12 +36,14 @@ class View(NamedTuple):
         frame: ray directions.
         origin: (3,) float32 camera position in scene units.
         width, height: the screen [px].
+        around: the media the camera is in.
     """
 
     frame: ViewFrame
     origin: NDArray[np.float32]
     width: int
     height: int
+    around: int
 
 
 class Cells(NamedTuple):
@@ -84,7 +87,8 @@ _local = threading.local()
 def view_of(prepared: PreparedScene, camera: Camera, display: Display) -> View:
     """The view of `camera` on `display` in the units of `prepared`."""
     position = (np.array(camera.position, dtype=np.float64) - prepared.center) * prepared.scale
-    return View(view_frame(camera, display), position.astype(np.float32), display.width_px, display.height_px)
+    origin = position.astype(np.float32)
+    return View(view_frame(camera, display), origin, display.width_px, display.height_px, media_at(prepared, origin))
 
 
 def block_rays(prepared: PreparedScene, quality: Quality) -> int:
@@ -95,6 +99,10 @@ def block_rays(prepared: PreparedScene, quality: Quality) -> int:
 def shadow_rays_each(quality: Quality) -> int:
     """Shadow rays that each camera sample of a cell sends to each area light: its share of the cell's."""
     return max(1, -(-quality.shadow_samples // quality.samples_per_cell))
+
+
+def _has_media(prepared: PreparedScene) -> bool:
+    return len(prepared.surfaces.indices) > 1
 
 
 def _most_shadow_rays(prepared: PreparedScene, quality: Quality) -> int:
@@ -127,6 +135,8 @@ def trace_cells(
         view.frame, view.origin, view.width, view.height, cells.x, cells.y, cells.side, cells.chosen,
         cells.first, cells.until, points, step, lattice_order(points), scratch.level(0),
     )  # fmt: skip
+    if _has_media(prepared):
+        scratch.level(0).around[:n] = view.around
     if len(prepared.surfaces.area_lights):
         seed_samples(cells.x, cells.y, cells.side, cells.chosen, cells.first, cells.until, scratch.seed, scratch.number)
     radiance = np.zeros((n, 3), dtype=np.float32)
@@ -207,6 +217,8 @@ def _shade_batch(
     hits = prepared.intersector.nearest(batch.origin, batch.direction)
     if "cutouts" in prepared.plan.names:
         pass_holes(prepared.surfaces, prepared.intersector, batch.origin, batch.direction, hits)
+    if _has_media(prepared):
+        pass_hidden(prepared, batch.origin, batch.direction, batch.around, hits)
     counters = scratch.counters
     children = scratch.level(draws.depth + 1)
     shade(

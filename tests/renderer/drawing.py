@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import itertools
 import math
 
 import numpy as np
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from renderer.camera import Camera
 from renderer.display import Display
 from renderer.frame import Frame, FrameRequest
+from renderer.fresnel import fresnel
 from renderer.gaze import Gaze
 from renderer.pipeline import Renderer
 from renderer.prepared import PreparedScene, prepare
@@ -166,3 +168,17 @@ def glass_and_mirror() -> Scene:
         surroundings=Surroundings((0.3, 0.5, 0.9), (0.7, 0.7, 0.7), (0.05, 0.05, 0.05)),
         camera=Camera((0, 1, 7), (0, 0, 0)),
     )
+
+
+ABOVE, BELOW = Surroundings(zenith=WHITE), Surroundings(horizon=WHITE)
+HEIGHT = ABOVE
+"""Radiance is the height of the ray's direction: rays that go level or down see nothing."""
+
+
+def straight_share(angle_deg: float, *indices: float) -> float:
+    """What a ray keeps that crosses parallel faces between media of these indices."""
+    sine, share = math.sin(math.radians(angle_deg)) * indices[0], 1.0
+    for before, behind in itertools.pairwise(indices):
+        cosine, refracted = (math.sqrt(1 - (sine / n) ** 2) for n in (before, behind))
+        share *= 1 - fresnel(cosine, refracted, before / behind)
+    return share

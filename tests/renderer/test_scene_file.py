@@ -109,7 +109,7 @@ def test_the_worked_example_shows_every_field(folder: Path) -> None:
     assert fields | {"emission"} == {
         "diffuse", "specular", "shininess", "emission", "reflection", "transmission", "ior", "diffuse_texture",
         "base", "exponent_u", "exponent_v", "specular_texture",
-        "alpha_texture", "alpha_cutoff", "normal_texture", "normal_scale",
+        "alpha_texture", "alpha_cutoff", "normal_texture", "normal_scale", "priority",
     }  # fmt: skip
 
 
@@ -258,6 +258,7 @@ RECTANGLE = "[[light]]\nkind = 'rectangle'\ncorner = [0, 0, 0]\nradiance = [1, 1
             "[materials.red]\nexponent_v = -1",
             "vase/scene.toml: materials.red.exponent_v: expected a number in [0, 1e+09], found -1",
         ),
+        ("[materials.red]\npriority = 1.5", "vase/scene.toml: materials.red.priority: expected an integer"),
         ("[materials.red]\nior = 100", "vase/scene.toml: materials.red.ior: expected a number in [0.1, 10], found 100"),
         (
             "[materials.red]\ndiffuse_texture = 'none.png'",
