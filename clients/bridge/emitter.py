@@ -23,7 +23,7 @@ from clients.bridge.port import SerialPort
 TCP = "tcp:"
 SPAN_S = 0.05
 """Longest wait before it is looked whether to stop."""
-PATIENCE_NS = SECOND_NS
+PATIENCE_NS = 3 * SECOND_NS
 """A pseudo-terminal holds a few KiB, which is less than a reader may be held up on a busy machine: records wait so
 long for it, then they are discarded and counted."""
 
