@@ -1,25 +1,18 @@
 """The frames of a clip on disk, so that a run that was interrupted can go on.
 
-Beside the pictures lies `frames.jsonl`: on its first line the request they are of, then a line for each finished
-frame with its cost. A line is written once its picture is complete; half a line at the end does not count.
+Beside the pictures lies `frames.jsonl`, a journal of the finished frames with their costs.
 """
 
 from __future__ import annotations
 
-import fcntl
-import json
-import os
-from collections.abc import Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Final
 
-from clients.command_line.errors import UsageError
+from clients.command_line.journal import Journal, Request
 from clients.command_line.render import write_whole
 
 LOG: Final = "frames.jsonl"
-
-Request = Mapping[str, Any]
 
 
 class FrameFolder:
@@ -37,7 +30,7 @@ class FrameFolder:
         self.pattern = pattern
         self.costs: dict[int, dict[str, Any]] = {}
         self.changed: tuple[str, ...] = ()
-        self._request = json.loads(json.dumps(request))
+        self._journal = Journal(folder / LOG, request)
 
     def __enter__(self) -> FrameFolder:
         """Take up what an earlier run of the same request left.
@@ -46,20 +39,22 @@ class FrameFolder:
             UsageError: if another run is at work there.
         """
         self.folder.mkdir(exist_ok=True)
-        self._log = (self.folder / LOG).open("a+b")
-        try:
-            fcntl.flock(self._log, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            self._log.close()
-            raise UsageError(f"{self.folder}: expected no other run at work there, found one") from None
-        self._take_up()
+        self._journal.__enter__()
+        for record in self._journal.records:
+            frame, cost = record.get("frame"), record.get("cost")
+            if isinstance(frame, int) and isinstance(cost, dict) and self.path(frame).is_file():
+                self.costs[frame] = cost
+        self.changed = self._journal.changed
+        if self.changed:
+            self._forget()
+            self._journal.start_over()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
         """Leave everything as it is, for the next run."""
-        self._log.close()
+        self._journal.__exit__(kind, error, traceback)
 
     def path(self, frame: int) -> Path:
         """Where a frame is, or will be."""
@@ -68,52 +63,17 @@ class FrameFolder:
     def add(self, frame: int, picture: bytes, cost: dict[str, Any]) -> None:
         """Keep a finished frame."""
         write_whole(self.path(frame), picture)
-        self._write({"frame": frame, "cost": cost})
+        self._journal.add({"frame": frame, "cost": cost})
         self.costs[frame] = cost
 
     def remove(self) -> None:
         """Remove the frames, and the folder if nothing else is in it."""
         self._forget()
-        (self.folder / LOG).unlink()
+        self._journal.path.unlink()
         if not any(self.folder.iterdir()):
             self.folder.rmdir()
-
-    def _take_up(self) -> None:
-        self._log.seek(0)
-        whole = self._log.read().rpartition(b"\n")[0]
-        records = [_record(line) for line in whole.splitlines()]
-        earlier = records[0].get("request") if records else self._request
-        if not isinstance(earlier, dict):
-            self._log.close()
-            raise UsageError(f"{self.folder / LOG}: expected what an earlier run wrote there, found something else")
-        for record in records[1:]:
-            frame, cost = record.get("frame"), record.get("cost")
-            if isinstance(frame, int) and isinstance(cost, dict) and self.path(frame).is_file():
-                self.costs[frame] = cost
-        if records and earlier == self._request:
-            self._log.truncate(len(whole) + 1)
-            return
-        names = dict.fromkeys((*self._request, *earlier))
-        self.changed = tuple(name for name in names if earlier.get(name) != self._request.get(name))
-        self._forget()
-        self._log.truncate(0)
-        self._write({"request": self._request})
 
     def _forget(self) -> None:
         for frame in self.costs:
             self.path(frame).unlink(missing_ok=True)
         self.costs.clear()
-
-    def _write(self, record: dict[str, Any]) -> None:
-        self._log.seek(0, os.SEEK_END)
-        self._log.write(json.dumps(record).encode() + b"\n")
-        self._log.flush()
-
-
-def _record(line: bytes) -> dict[str, Any]:
-    """One line of the log; an empty record for a line that somebody else wrote."""
-    try:
-        record = json.loads(line)
-    except ValueError:
-        return {}
-    return record if isinstance(record, dict) else {}
