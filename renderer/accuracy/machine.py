@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import platform
 import re
@@ -13,6 +14,9 @@ from renderer.accuracy.record import Machine
 
 PACKAGES: Final = ("numpy", "numba", "llvmlite", "embreex", "pillow")
 """Packages whose versions decide speed or pictures."""
+
+METRICS: Final = ("flip-evaluator", "pyfvvdp")
+"""Packages that judge pictures; any may be missing."""
 
 CPU_INFO: Final = Path("/proc/cpuinfo")
 """Where Linux names the processor."""
@@ -32,7 +36,7 @@ def this_machine(threads: int) -> Machine:
         memory_gib=round(memory_bytes / 2**30, 1),
         platform=platform.platform(),
         python=platform.python_version(),
-        packages={name: metadata.version(name) for name in PACKAGES},
+        packages={name: metadata.version(name) for name in PACKAGES} | _versions(METRICS),
     )
 
 
@@ -43,3 +47,12 @@ def processor_name() -> str:
         if found is not None:
             return found[1].strip()
     return platform.processor() or platform.machine()
+
+
+def _versions(names: tuple[str, ...]) -> dict[str, str]:
+    """Those that are installed."""
+    installed = {}
+    for name in names:
+        with contextlib.suppress(metadata.PackageNotFoundError):
+            installed[name] = metadata.version(name)
+    return installed

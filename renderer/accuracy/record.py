@@ -102,12 +102,16 @@ class FrameTime:
 class Accuracy:
     """How far a frame is from the reference. The fovea is what lies within 2.5 deg of the gaze.
 
+    What the screen shows is meant in linear light from 0 to 1, white: a lamp that is a thousand times as bright as
+    white shows as white, and would drown all else if it did not. A frame's own estimate knows no screen.
+
     Attributes:
-        luminance_ratio: mean luminance over that of the reference, linear light.
-        relative_mse: mean squared error of luminance over the reference's squared luminance plus 0.01, linear light.
-        rms, foveal_rms: root mean square error of luminance, linear light: what `stated_error` estimates.
-        foveal_psnr_db: [dB] of what the screen shows, in linear light from 0 to 1.
-        foveal_max_error: largest difference of a colour channel of that, 0 to 1.
+        luminance_ratio: mean luminance of what the screen shows over that of the reference.
+        relative_mse: mean of its squared error over the reference's squared luminance plus 0.01.
+        rms: root mean square error of the radiance's luminance, screen or not: what `stated_error` estimates.
+        foveal_psnr_db: peak signal-to-noise ratio of what the screen shows in the fovea [dB].
+        foveal_max_error: largest difference of a colour channel of that.
+        foveal_rms: as `rms`, in the fovea.
         flip_mean, flip_p99: FLIP, mean and 99th percentile over the screen, 0 to 1; it knows no gaze.
         jod, jod_heat_foveal_p99: FovVideoVDP with the gaze: quality, 10 for no difference; 99th percentile of
             its map of differences within 5 deg of the gaze.
