@@ -45,7 +45,11 @@ FLAG_OF_FIELD = {
 
 
 def add_frame_flags(
-    parser: argparse.ArgumentParser, samples: int = Quality().samples_per_cell, *, gaze: bool = True
+    parser: argparse.ArgumentParser,
+    samples: int = Quality().samples_per_cell,
+    *,
+    gaze: bool = True,
+    detail: bool = True,
 ) -> None:
     """Add the flags of `FLAG_OF_FIELD` to `parser`, with the records' own defaults, but `samples` a cell.
 
@@ -53,12 +57,14 @@ def add_frame_flags(
         parser: of the command.
         samples: default of `--samples`.
         gaze: False leaves `--gaze` out, for a command that has its gaze from elsewhere.
+        detail: False leaves out those of the quality, for a command that has its own.
     """
     if gaze:
         _add_gaze_flag(parser.add_argument_group("gaze"))
     parser.set_defaults(gaze=None)
     _add_screen_flags(parser.add_argument_group("screen"))
-    _add_quality_flags(parser.add_argument_group("detail"), samples)
+    if detail:
+        _add_quality_flags(parser.add_argument_group("detail"), samples)
     camera = parser.add_argument_group("camera (each defaults to the scene's own)")
     camera.add_argument("--camera-position", type=three_numbers, metavar="X,Y,Z", help="where the eye is [m]")
     camera.add_argument("--camera-look-at", type=three_numbers, metavar="X,Y,Z", help="the middle of the picture [m]")
@@ -148,13 +154,16 @@ def _add_quality_flags(detail: argparse._ArgumentGroup, samples: int) -> None:
     )
 
 
-def frame_request(arguments: argparse.Namespace, scene_camera: Camera, *, linear: bool = False) -> FrameRequest:
+def frame_request(
+    arguments: argparse.Namespace, scene_camera: Camera, *, linear: bool = False, quality: Quality | None = None
+) -> FrameRequest:
     """What the flags ask for.
 
     Args:
         arguments: parsed flags of `add_frame_flags`.
         scene_camera: the scene's own view, for what the flags leave open.
         linear: whether to ask for float32 radiance.
+        quality: in place of that of the flags.
 
     Raises:
         UsageError: naming the flag whose value is out of range.
@@ -162,7 +171,11 @@ def frame_request(arguments: argparse.Namespace, scene_camera: Camera, *, linear
     try:
         display = display_of(arguments)
         return FrameRequest(
-            gaze_of(arguments, display), display, _camera_of(arguments, scene_camera), quality_of(arguments), linear
+            gaze_of(arguments, display),
+            display,
+            _camera_of(arguments, scene_camera),
+            quality_of(arguments) if quality is None else quality,
+            linear,
         )
     except SettingsError as error:
         raise blame_flag(error, FLAG_OF_FIELD) from error

@@ -8,13 +8,14 @@ from pathlib import Path
 
 import pytest
 
-from renderer.accuracy.machine import PACKAGES, processor_name, this_machine
+from renderer.accuracy.machine import METRICS, PACKAGES, processor_name, this_machine
 
 
 def test_it_names_this_machine() -> None:
     machine = this_machine(3)
     assert (machine.threads, machine.cores) == (3, os.cpu_count())
-    assert machine.packages == {name: metadata.version(name) for name in PACKAGES}
+    assert {name: metadata.version(name) for name in machine.packages} == machine.packages
+    assert set(PACKAGES) <= set(machine.packages) <= {*PACKAGES, *METRICS}
     assert machine.processor == processor_name() != ""
 
 
