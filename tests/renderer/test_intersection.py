@@ -5,7 +5,6 @@ from __future__ import annotations
 import threading
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -83,34 +82,6 @@ def test_the_nearest_hit_is_what_trying_every_triangle_finds(seed: int, triangle
     sure &= ~(np.abs(first[:, 0] - reach) < 1e-4 * reach)
     blocked = intersector(vertices, faces).occluded(origin, direction, reach.copy())
     np.testing.assert_array_equal(blocked[sure], (first[:, 0] < reach)[sure])
-
-
-@pytest.mark.parametrize(
-    ("origin", "direction"),
-    [
-        (np.zeros((4, 3), np.float32), np.ones((3, 3), np.float32)),
-        (np.zeros((4, 3), np.float32), np.ones((1, 3), np.float32)),
-        (np.zeros((4, 3), np.float64), np.ones((4, 3), np.float64)),
-        (np.zeros((4, 3), np.float32), np.ones((4, 3), np.float64)),
-        (np.zeros((3, 4), np.float32), np.ones((3, 4), np.float32)),
-        (np.zeros((4, 3), np.float32, order="F"), np.ones((4, 3), np.float32)),
-        (np.zeros((8, 3), np.float32)[::2], np.ones((4, 3), np.float32)),
-        (np.zeros(3, np.float32), np.ones(3, np.float32)),
-    ],
-)
-def test_h10_rays_of_a_wrong_shape_are_refused(origin: NDArray[np.float32], direction: NDArray[np.float32]) -> None:
-    made = intersector(TRIANGLE, np.array([[0, 1, 2]]))
-    with pytest.raises(ValueError, match="expected"):
-        made.nearest(origin, direction)
-    with pytest.raises(ValueError, match="expected"):
-        made.occluded(origin, direction, np.ones(len(origin), np.float32))
-
-
-def test_h10_a_reach_of_a_wrong_shape_is_refused() -> None:
-    made = intersector(TRIANGLE, np.array([[0, 1, 2]]))
-    for reach in (np.ones(1, np.float32), np.ones(2), np.ones((2, 1), np.float32)):
-        with pytest.raises(AssertionError):
-            made.occluded(*rays([(0, 0, 1)] * 2, [(0, 0, -1)] * 2), reach)
 
 
 def test_no_rays_and_nothing_to_hit() -> None:

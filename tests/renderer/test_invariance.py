@@ -9,8 +9,8 @@ import pytest
 
 from renderer.camera import Camera
 from renderer.pipeline import Renderer
-from renderer.scene import Material, Mesh, PointLight, Rgb, Scene, Sphere, Surroundings, Texture
-from tests.renderer.drawing import BLACK, ball_mesh, box, floor, glass, mirror, shoot
+from renderer.scene import Material, PointLight, Rgb, Scene, Sphere, Surroundings, Texture
+from tests.renderer.drawing import ball_mesh, box, floor, glass, mirror, shoot
 
 
 def moved(scene: Scene, factor: float, offset: Rgb) -> Scene:
@@ -81,26 +81,3 @@ def test_h18_far_away_changes_no_bit(renderer: Renderer, distance: float) -> Non
         shoot(renderer, s, 48, 36, samples=2) for s in (scene, moved(scene, 1.0, (distance, -distance, distance)))
     )
     np.testing.assert_array_equal(far.pixels, plain.pixels)
-
-
-def test_h12_faces_in_one_plane_show_one_of_them_always_the_same(renderer: Renderer) -> None:
-    """A grid twice, the second time shuffled and of another colour: any winner, but the same in every run."""
-    n = 16
-    y, x = np.mgrid[0 : n + 1, 0 : n + 1]
-    vertices = np.stack([x.ravel() - n / 2, y.ravel() - n / 2, 0.0 * x.ravel()], axis=1)
-    first = (np.arange(n)[:, None] * (n + 1) + np.arange(n)).ravel()
-    one = np.concatenate(
-        [np.stack([first, first + 1, first + n + 2], 1), np.stack([first, first + n + 2, first + n + 1], 1)]
-    )
-    two = np.concatenate(
-        [np.stack([first, first + 1, first + n + 1], 1), np.stack([first + 1, first + n + 2, first + n + 1], 1)]
-    )
-    two = np.random.default_rng(12).permutation(two)
-    red, green = (Material(diffuse=BLACK, emission=colour) for colour in ((1, 0, 0), (0, 1, 0)))
-    scene = Scene(meshes=(Mesh(vertices, one, red), Mesh(vertices, two, green)), camera=Camera((0, 0, 30), (0, 0, 0)))
-    seen = shoot(renderer, scene, 64, 64).pixels
-    assert set(np.unique(seen.reshape(-1, 3), axis=0).tobytes()) <= set(np.float32([0, 1]).tobytes())
-    for threads in (1, 3):
-        fresh = Renderer(threads=threads)
-        np.testing.assert_array_equal(shoot(fresh, scene, 64, 64).pixels, seen)
-        fresh.close()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import time
 
 import numpy as np
 import pytest
@@ -70,60 +69,6 @@ def test_without_geometry_the_world_stays_where_it_is() -> None:
     prepared = prepare(Scene())
     assert prepared.scale == 1.0
     np.testing.assert_array_equal(prepared.center, 0.0)
-
-
-DEGENERATE = {
-    "a point": [(1, 1, 1)] * 3,
-    "a line": [(-1, 0, 1), (0, 0, 1), (1, 0, 1)],
-    "two equal corners": [(0, 0, 0), (0, 0, 0), (1, 2, 3)],
-    "a line askew": [(-1113.45459, y, -56.2431908) for y in (-79.049614, -87.0922699, -79.2090149)],
-}
-
-
-@pytest.mark.parametrize("corners", DEGENERATE.values(), ids=DEGENERATE.keys())
-def test_h08_a_triangle_without_area_is_never_seen(corners: list[tuple[float, float, float]]) -> None:
-    middle = np.mean(corners, axis=0)
-    prepared = prepare(Scene(meshes=(triangles(corners, lamp()), triangles(TRIANGLE + middle - (0, 0, 2)))))
-    assert prepared.intersector.triangles == 1
-
-
-def test_h08_neighbours_of_a_triangle_without_area_are_unchanged(renderer: Renderer) -> None:
-    good = triangles(TRIANGLE)
-    bad = triangles([*TRIANGLE, (0, 0, 0), (0, 0, 0), (0, 0.5, 0), (-1, 0, 0), (0, 0, 0), (1, 0, 0)])
-    lights = (light(1, 2, 3, 9.0),)
-    alone = shoot(renderer, Scene(meshes=(good,), lights=lights, camera=FRONT), 32, 32)
-    among = shoot(renderer, Scene(meshes=(bad,), lights=lights, camera=FRONT), 32, 32)
-    np.testing.assert_array_equal(alone.pixels, among.pixels)
-
-
-def test_h11_copies_of_a_triangle_count_once_and_cost_nothing(renderer: Renderer) -> None:
-    copies = np.tile(TRIANGLE, (100_000, 1))
-    lights = (light(1, 2, 3, 9.0),)
-    began = time.perf_counter()
-    many = prepare(Scene(meshes=(triangles(copies),), lights=lights, camera=FRONT))
-    seen = shoot(renderer, many, 64, 64)
-    assert time.perf_counter() - began < 2.0
-    assert many.intersector.triangles == 1
-    alone = shoot(renderer, Scene(meshes=(triangles(TRIANGLE),), lights=lights, camera=FRONT), 64, 64)
-    np.testing.assert_array_equal(seen.pixels, alone.pixels)
-
-
-def test_h11_the_first_of_equal_triangles_is_kept(renderer: Renderer) -> None:
-    red, green = Material(diffuse=BLACK, emission=(1, 0, 0)), Material(diffuse=BLACK, emission=(0, 1, 0))
-    for first, second, colour in ((red, green, (1, 0, 0)), (green, red, (0, 1, 0))):
-        both = (triangles(TRIANGLE, first), triangles(TRIANGLE + 0.0, second))
-        seen = shoot(renderer, Scene(meshes=both, camera=FRONT), 9, 9)
-        assert seen.pixels[4, 4].tolist() == list(colour)
-
-
-def test_h11_minus_zero_is_zero() -> None:
-    assert prepare(Scene(meshes=(triangles(TRIANGLE), triangles(TRIANGLE * (1, 1, -1))))).intersector.triangles == 1
-
-
-def test_triangles_that_differ_in_one_corner_are_both_kept() -> None:
-    other = TRIANGLE.copy()
-    other[2, 1] += 1e-6
-    assert prepare(Scene(meshes=(triangles(TRIANGLE), triangles(other)))).intersector.triangles == 2
 
 
 NO_NORMALS = {

@@ -8,7 +8,6 @@ import math
 import numpy as np
 import pytest
 
-from renderer.camera import Camera
 from renderer.pipeline import Renderer
 from renderer.scene import Material, Mesh, PointLight, Rgb, Scene, Sphere, Surroundings
 from tests.renderer.drawing import (
@@ -21,7 +20,6 @@ from tests.renderer.drawing import (
     ball_mesh,
     floor,
     icosphere,
-    lamp,
     light,
     pixel,
     quad,
@@ -120,29 +118,6 @@ def test_a_light_without_shadows_shines_through_everything(renderer: Renderer) -
             meshes=(floor(WHITE_LAMBERT), roof), lights=(light(0, 2, 0, 1.0, casts),), camera=aim((0, 1, 0), (0, 0, 0))
         )
         assert pixel(renderer, scene) == pytest.approx(0.0 if casts else 0.25 / math.pi, rel=8 * U)
-
-
-@pytest.mark.parametrize("gap", [1e-3, 1e-4])
-def test_h03_a_blocker_just_before_the_light_or_the_floor_blocks(renderer: Renderer, gap: float) -> None:
-    for height in (gap, 2.0 - gap):
-        roof = floor(WHITE_LAMBERT, height, 1.0)
-        camera = aim((0, height / 2, 0), (0, 0, 0))
-        assert pixel(renderer, Scene(meshes=(floor(WHITE_LAMBERT), roof), lights=(light(0, 2, 0),), camera=camera)) == 0
-
-
-@pytest.mark.parametrize("offset", [(0.0, 0.0, 0.0), (1000.0, 1000.0, 1000.0)])
-def test_h03_the_lamp_a_light_hangs_under_takes_no_light_away(renderer: Renderer, offset: Rgb) -> None:
-    """A light in the very plane of a triangle: what it lights is as bright as without the triangle."""
-    place = np.add((0.1, 5.0, -0.2), offset)
-    plate = Mesh(np.array([[-1, 5, -1], [1, 5, -1], [0, 5, 1]]) + offset, np.array([[0, 1, 2]]), lamp())
-    ground = moved(floor(WHITE_LAMBERT), 1.0, offset)
-    camera = Camera(tuple(np.add((0, 4, 0), offset)), tuple(np.array(offset)), (0, 0, 1), 90)
-    lights = (light(*place, 50.0),)
-    bare, under = (
-        shoot(renderer, Scene(meshes=meshes, lights=lights), 64, 64, camera=camera).pixels
-        for meshes in ((ground, dataclasses.replace(plate, casts_shadows=False)), (ground, plate))
-    )
-    np.testing.assert_array_equal(under, bare)
 
 
 def test_the_helper_makes_closed_balls() -> None:

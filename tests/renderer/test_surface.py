@@ -13,7 +13,7 @@ from renderer.camera import Camera, view_frame
 from renderer.display import Display
 from renderer.pipeline import Renderer
 from renderer.prepared import FACET, prepare
-from renderer.scene import Material, Mesh, Rgb, Scene, Sphere
+from renderer.scene import Material, Mesh, Scene, Sphere
 from renderer.surface import weights_at
 from tests.renderer.drawing import (
     EVERYWHERE_1,
@@ -31,34 +31,6 @@ from tests.renderer.drawing import (
     quad,
     shoot,
 )
-
-
-def moved(mesh: Mesh, factor: float, offset: Rgb = (0, 0, 0)) -> Mesh:
-    return dataclasses.replace(mesh, vertices=factor * mesh.vertices + np.array(offset, dtype=np.float64))
-
-
-SIZES = (1e-3, 1.0, 1e3, 1e6)
-
-
-@pytest.mark.parametrize("size", SIZES)
-@pytest.mark.parametrize("away", [0.0, 1e3])
-@pytest.mark.parametrize("kind", ["flat", "smooth", "sphere"])
-def test_h01_a_convex_body_casts_no_shadow_on_itself(renderer: Renderer, size: float, away: float, kind: str) -> None:
-    """The picture is the same whether it casts shadows or not, but where the light only grazes."""
-    offset = (away * size, -away * size, 0.0)
-    camera = Camera(tuple(np.add((0, 0, 5 * size), offset)), offset, vertical_fov_deg=25)
-    lights = (light(*np.add((4 * size, 3 * size, 5 * size), offset), math.pi * 50 * size * size),)
-    pictures = []
-    for casts in (False, True):
-        if kind == "sphere":
-            scene = Scene(spheres=(Sphere(offset, size, WHITE_LAMBERT, casts),), lights=lights)
-        else:
-            mesh = moved(ball_mesh(WHITE_LAMBERT, 3, kind == "smooth", casts), size, offset)
-            scene = Scene(meshes=(mesh,), lights=lights)
-        pictures.append(shoot(renderer, scene, 128, 128, camera=camera).pixels[..., 0])
-    assert (pictures[0] > 0.1).mean() > 0.3
-    grazing = pictures[0] < 1e-5
-    np.testing.assert_array_equal(pictures[1][~grazing], pictures[0][~grazing])
 
 
 def hits_of(mesh: Mesh, camera: Camera, side_px: int) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
