@@ -135,18 +135,6 @@ def test_nodes_multiply_from_the_root_down_and_are_instanced(tmp_path: Path) -> 
     assert sorted(mesh.vertices[0].tolist() for mesh in meshes) == [[10, 1, 0], [10, 2, 0]]
 
 
-def test_mirrored_and_unequal_scales_keep_normals_outward(tmp_path: Path) -> None:
-    sources = (DAE_SQUARE + dae_source("n", (1, 0, 1) * 4, 3)).replace(
-        "</vertices>", '<input semantic="NORMAL" source="#n"/></vertices>'
-    )
-    nodes = '<node><scale>-1 1 2</scale><instance_geometry url="#g"/></node>'
-    (mesh,) = read(tmp_path, dae(sources=sources, nodes=nodes)).meshes
-    assert mesh.normals is not None
-    normal = mesh.normals[0] / np.linalg.norm(mesh.normals[0])
-    np.testing.assert_allclose(normal, np.array([-1, 0, 0.5]) / math.sqrt(1.25), atol=1e-12)
-    np.testing.assert_allclose(area_vector(mesh), [0, 0, 1], atol=1e-12)
-
-
 def test_without_a_scene_all_geometry_is_shown(tmp_path: Path) -> None:
     text = dae()
     bare = text[: text.index("<library_visual_scenes>")] + "</COLLADA>"

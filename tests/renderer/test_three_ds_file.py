@@ -147,18 +147,6 @@ def test_faces_smooth_by_way_of_a_third(tmp_path: Path) -> None:
     assert first[2] > 0
 
 
-def test_an_object_with_mirrored_axes_is_mirrored_back(tmp_path: Path) -> None:
-    mirrored = [(7 - x, y, z) for x, y, z in CUBE]
-    matrix = chunk(0x4160, struct.pack("<12f", -1, 0, 0, 0, 1, 0, 0, 0, 1, 3, 0, 0))
-    (mesh,) = read(tmp_path, three_ds_object("Box", three_ds_cube(matrix, vertices=mirrored))).meshes
-    assert volume(mesh) == pytest.approx(1.0)
-    # the mirror stands at the object's own origin, x = 3
-    assert mesh.vertices[:, 0].tolist() == [-1.0, 0.0] * 4
-    plain = chunk(0x4160, struct.pack("<12f", 2, 0, 0, 0, 1, 0, 0, 0, 1, 3, 0, 0))
-    (mesh,) = read(tmp_path, three_ds_object("Box", three_ds_cube(plain))).meshes
-    assert mesh.vertices[:, 0].tolist() == [0.0, 1.0] * 4
-
-
 def test_lights_and_the_camera(tmp_path: Path) -> None:
     def lamp(*more: bytes) -> bytes:
         return chunk(0x4600, struct.pack("<3f", 1, 2, 3), chunk(0x0010, struct.pack("<3f", 1, 0.5, 0)), *more)

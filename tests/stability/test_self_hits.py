@@ -18,8 +18,7 @@ from renderer.kernel import kernel
 from renderer.pipeline import Renderer
 from renderer.prepared import NORMAL_COLUMN, PreparedScene
 from renderer.scene import Material, Mesh, Rgb, Scene, Sphere
-from renderer.sphere import hit_distance
-from renderer.surface import sphere_surface, triangle_surface, weights_at
+from renderer.surface import triangle_surface, weights_at
 from tests.renderer.drawing import BLACK, WHITE_LAMBERT, aim, ball_mesh, floor, light, pixel, shoot
 from tests.stability.shapes import Floats, directions, prepared_mesh, rotation
 
@@ -208,46 +207,6 @@ def test_h01_a_convex_body_casts_no_shadow_on_itself(renderer: Renderer, size: f
     assert (pictures[0] > 0.1).mean() > 0.3
     grazing = pictures[0] < 1e-5
     np.testing.assert_array_equal(pictures[1][~grazing], pictures[0][~grazing])
-
-
-@kernel
-def leave_sphere(
-    sphere: NDArray[np.float64],
-    start: NDArray[np.float64],
-    coming: NDArray[np.float64],
-    out: NDArray[np.float64],
-    again: NDArray[np.float64],
-) -> None:
-    """Distances at which rays meet a sphere again that leave it, outwards, where others met it."""
-    cx, cy, cz, r = sphere[0], sphere[1], sphere[2], sphere[3]
-    for ray in range(len(again)):
-        s = sphere_surface(
-            cx, cy, cz, r, 0, start[ray, 0], start[ray, 1], start[ray, 2],
-            coming[ray, 0], coming[ray, 1], coming[ray, 2],
-        )  # fmt: skip
-        x, y, z = out[ray, 0], out[ray, 1], out[ray, 2]
-        side = 1.0 if x * s.gx + y * s.gy + z * s.gz >= 0.0 else -1.0
-        ox, oy, oz = s.px + s.offset * s.gx, s.py + s.offset * s.gy, s.pz + s.offset * s.gz
-        again[ray] = hit_distance(
-            np.float64(np.float32(ox)), np.float64(np.float32(oy)), np.float64(np.float32(oz)),
-            np.float64(np.float32(side * x)), np.float64(np.float32(side * y)), np.float64(np.float32(side * z)),
-            cx, cy, cz, r,
-        )  # fmt: skip
-
-
-def test_h22_a_ray_that_leaves_a_sphere_does_not_meet_it_again() -> None:
-    """1,000 spheres of radius 10^-4 to 10^4, each at a place up to ten radii off, 100 rays each (pbrt-v4,
-    shapes_test.cpp, FullSphere): 0 of 100,000.
-    """
-    rng = np.random.default_rng(22)
-    for radius in 10.0 ** rng.uniform(-4, 4, 1000):
-        center = radius * rng.uniform(-10, 10, 3)
-        toward, again = directions(rng, 100), np.zeros(100)
-        start = (center + 3 * radius * toward).astype(np.float32).astype(np.float64)
-        coming = center + 0.9 * radius * directions(rng, 100) - start
-        coming /= np.linalg.norm(coming, axis=1, keepdims=True)
-        leave_sphere(np.array([*center, radius]), start, coming, directions(rng, 100), again)
-        assert np.isinf(again).all()
 
 
 @pytest.mark.parametrize("offset", [0.0, 1e3, 1e5])
