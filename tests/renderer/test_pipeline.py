@@ -58,20 +58,6 @@ def test_the_frames_tried_here_have_cells_of_many_sides(renderer: Renderer) -> N
 
 
 @pytest.mark.parametrize("tiling", MAPS)
-@pytest.mark.parametrize("antialiasing", ["stochastic", "regular"])
-def test_h53_threads_change_no_byte(renderer: Renderer, scene: PreparedScene, tiling: str, antialiasing: str) -> None:
-    asked = request((30, 20), dataclasses.replace(FOVEATED, map=tiling, antialiasing=antialiasing))
-    pictures = []
-    for threads in (1, 2, 3, 8):
-        fresh = Renderer(threads=threads)
-        for linear in (True, False):
-            pictures.append(fresh.render(scene, dataclasses.replace(asked, linear=linear)).pixels)
-        fresh.close()
-    for linear, picture in zip([True, False] * 4, pictures, strict=True):
-        np.testing.assert_array_equal(picture, pictures[0 if linear else 1])
-
-
-@pytest.mark.parametrize("tiling", MAPS)
 def test_what_was_rendered_before_changes_no_byte(scene: PreparedScene, tiling: str) -> None:
     quality = dataclasses.replace(FOVEATED, map=tiling)
     wanted = request((50, 30), quality)

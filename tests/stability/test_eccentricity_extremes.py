@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 
 import numpy as np
 import pytest
@@ -11,9 +12,10 @@ from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 from numpy.typing import NDArray
 
-from renderer.acuity import ECCENTRICITIES, Acuity, unit_angle_deg
+from renderer.acuity import ECCENTRICITIES, Acuity, contrast_threshold, cut_off_cpd, unit_angle_deg
 from renderer.display import Display
 from renderer.eccentricity import eccentricity_deg
+from renderer.errors import SettingsError
 from renderer.frame import FrameRequest
 from renderer.gaze import Gaze
 from renderer.pipeline import Renderer
@@ -25,7 +27,10 @@ from tests.renderer.viewing import (
     acuities,
     displays,
     gazes,
+    pixel_centres,
+    point_of,
     sizes_at,
+    true_cell_size,
     true_eccentricity,
 )
 
@@ -164,3 +169,48 @@ def test_h60_where_the_eye_resolves_every_pixel_the_frame_is_the_full_one(render
         for other in others:
             assert other.cost.cells == wide.pixels
             np.testing.assert_array_equal(other.pixels, full.pixels)
+
+
+def test_h55_an_angle_from_its_cosine_would_be_blind() -> None:
+    """Why angles come from atan2: beside the pixel looked at, acos of a dot product in float32 is off by a good part
+    of a pixel (0.0249 degrees), ours by less than 1e-11.
+    """
+    gaze = Gaze(1000.0, 500.0)
+    row = true_eccentricity(PAPER_SCREEN, gaze, "exact", np.longdouble)[500, 990:1010].astype(np.float64)
+    x, y = (part[500, 990:1010] for part in pixel_centres(PAPER_SCREEN))
+    sight = np.stack([x, y, np.full(20, 60.0)], axis=1).astype(np.float32)
+    looked_at = np.array([*point_of(PAPER_SCREEN, gaze), 60.0]).astype(np.float32)
+    cosines = sight @ looked_at / np.linalg.norm(sight, axis=1) / np.linalg.norm(looked_at)
+    assert cosines.dtype == np.float32
+    blind = np.degrees(np.arccos(np.minimum(cosines, 1).astype(np.float64)))
+    assert np.abs(blind - row).max() > 0.005
+    assert np.abs(eccentricity_deg(PAPER_SCREEN, gaze)[500, 990:1010] - row).max() < 1e-11
+
+
+def test_h58_the_eye_at_0_and_90_degrees() -> None:
+    assert cut_off_cpd(np.array([0.0, 90.0])) == pytest.approx([43.1, 1.4431775], rel=1e-7)
+    assert unit_angle_deg(np.array([0.0, 90.0])) == pytest.approx([0.0116009, 0.3464577], abs=1e-7)
+
+
+@pytest.mark.parametrize("distance_cm", [0.0, -1.0, math.nan, math.inf])
+def test_h58_distances_that_are_none_are_refused(distance_cm: float) -> None:
+    with pytest.raises(SettingsError, match=r"display\.distance_cm: expected a number in \(0, "):
+        dataclasses.replace(PAPER_SCREEN, distance_cm=distance_cm)
+
+
+@pytest.mark.parametrize("distance_cm", [1e-8, 1e-4, 0.1, 60.0, 1e4, 1e8])
+def test_h59_the_angle_of_a_pixel_is_no_difference_of_angles(distance_cm: float) -> None:
+    """From one arctangent of both its edges, against long double; at 1e-8 cm alpha / beta would be 1.45e10."""
+    display = dataclasses.replace(SQUARE, distance_cm=distance_cm)
+    truth = true_cell_size(display, Acuity(), Gaze(960.0, 540.0))[540, 960:]
+    _, sizes = middle_row(distance_cm)
+    clear = np.abs(truth - np.round(truth)) > 1e-6 * truth
+    np.testing.assert_array_equal(sizes[clear], np.floor(truth[clear]).astype(int))
+    assert sizes.min() >= 1
+    assert sizes.max() <= 1920
+
+
+def test_h59_other_models_at_0_and_90_degrees() -> None:
+    assert cut_off_cpd(np.array([0.0, 90.0]), "geisler-perry") == pytest.approx([39.2347, 0.977681], rel=1e-5)
+    assert contrast_threshold(60.0, 90.0, 1.0, 0.0461) == pytest.approx(math.exp(248.94), rel=1e-6)
+    assert contrast_threshold(1e4, 180.0, 1.0) == math.inf

@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
 from renderer.acuity import Acuity
-from renderer.cellmap import build_cell_map
+from renderer.cellmap import build_cell_map, cell_sizes
 from renderer.display import Display
+from renderer.eccentricity import eccentricity_deg, eye_geometry, largest_cell_side
 from renderer.errors import SettingsError
 from renderer.frame import FrameRequest
 from renderer.gaze import Gaze, GazeBucket, bucket_of
@@ -191,3 +192,41 @@ def test_h63_gazes_of_a_bucket_share_the_map_and_others_do_not() -> None:
     assert not fresh.cell_map(display, quality, Gaze(8.0, np.nextafter(8.0, 0.0)))[1]
     assert (fresh.map_cache.hits, fresh.map_cache.misses) == (3, 3)
     fresh.close()
+
+
+@pytest.mark.parametrize("tiling", MAPS)
+@pytest.mark.parametrize(("width", "height"), [(16_384, 24), (24, 16_384), (15_360, 9), (1, 16_384)])
+def test_h61_screens_16384_wide_are_shared_out(tiling: str, width: int, height: int, pool: WorkerPool) -> None:
+    """Strips of them: a whole one, 141 million pixels, takes 4 bytes a pixel for its mask, and is no other code."""
+    display = Display(width, height, width_cm=width / 100)
+    cells = build_cell_map(tiling, display, Acuity(scale=3.0), bucket_of(Gaze(width * 0.9, height / 2), 16), pool)
+    owned = pixels_of_each(cells)
+    assert owned.min() >= 1
+    assert owned.sum() == width * height
+    assert (cells.x + 1 <= width).all()
+    assert (cells.y + 1 <= height).all()
+    assert cells.x.max() < width
+    assert cells.x[cells.mask].dtype == np.int32
+
+
+@given(data=st.data(), acuity=acuities(MARGINS), bucket_px=st.sampled_from([0, 16, MAX_BUCKET_PX]))
+def test_h62_no_cell_is_larger_than_the_strips_are_made_for(
+    data: st.DataObject, acuity: Acuity, bucket_px: int
+) -> None:
+    """The bound that the tiles of the aligned tiling are sized by, for any screen and gaze."""
+    display = data.draw(displays(120, 90))
+    bucket = bucket_of(data.draw(gazes(display)), bucket_px)
+    assert cell_sizes(display, acuity, bucket).max() <= largest_cell_side(eye_geometry(display, acuity, bucket))
+
+
+@pytest.mark.parametrize("gaze", [Gaze(-1e6, 20.0), Gaze(-500.0, -500.0), Gaze(1e30, 15.0), Gaze(33.0, -9e3)])
+@pytest.mark.parametrize("distance_cm", [0.01, 0.3, 2.0])
+def test_h62_the_bound_holds_beyond_a_right_angle(gaze: Gaze, distance_cm: float) -> None:
+    """An eye so near that gaze and pixel are more than 90 degrees apart: there the greatest eccentricity need not be
+    in a corner of the screen, and half a turn is taken for it.
+    """
+    display = Display(40, 30, 50.0, None, distance_cm)
+    assert eccentricity_deg(display, gaze).max() > 90.0
+    for scale in (0.1, 1.0, 30.0):
+        acuity, bucket = Acuity(scale=scale), GazeBucket(gaze.x, gaze.y, 0)
+        assert cell_sizes(display, acuity, bucket).max() <= largest_cell_side(eye_geometry(display, acuity, bucket))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import numpy as np
@@ -14,14 +15,16 @@ from renderer.camera import Camera
 from renderer.errors import SceneError
 from renderer.pipeline import Renderer
 from renderer.scene import Material, Scene, Sphere, Texture
+from renderer.shapes import ball
 from renderer.store import (
     BRIGHTEST,
     SampleStore,
     add_samples,
 )
+from renderer.surface import sphere_surface
 from renderer.texture import srgb_to_linear, wrap
 from renderer.tonemap import encode_srgb
-from tests.renderer.drawing import WHITE, U, shoot
+from tests.renderer.drawing import WHITE, WHITE_LAMBERT, U, floor, light, shoot
 from tests.renderer.texel import AMBIENT, linear, look_up, picture, srgb_of
 
 
@@ -150,3 +153,57 @@ def test_h50_endless_light_is_cut_where_its_squares_still_fit(huge: float) -> No
     assert add_samples(store.samples, store.spread, np.array([0]), np.array([0], np.int32), all_of_them, radiance) == 0
     np.testing.assert_allclose(store.samples.total[0] / 4096, BRIGHTEST, rtol=1e-3)
     assert np.isfinite(store.samples.square[0])
+
+
+def coordinates(place: tuple[float, float, float]) -> tuple[float, float]:
+    """(u, v) of the unit sphere where a ray to the centre meets it."""
+    x, y, z = (9 * part for part in place)
+    length = math.hypot(x, y, z)
+    s = sphere_surface(0, 0, 0, 1.0, 0, x, y, z, -x / length, -y / length, -z / length)
+    return s.u, s.v
+
+
+@pytest.mark.parametrize("x", [1e-7, 1e-12, 5e-324, 0.0])
+def test_h47_across_the_seam_a_sphere_shows_neighbouring_texels(x: float) -> None:
+    """u goes from 1 to 0 at the meridian behind, where atan2(0, -1) and atan2(-0, -1) differ by a turn."""
+    (right, _), (left, _) = coordinates((x, 0.2, -1.0)), coordinates((-x, 0.2, -1.0))
+    step = abs(wrap(right) - wrap(left))
+    assert min(step, 1 - step) <= 1.1e-7
+    assert all(0.0 <= u <= 1.0 for u in (right, left))
+
+
+@pytest.mark.parametrize("y", [1.0, -1.0])
+@pytest.mark.parametrize("aside", [0.0, -0.0, 1e-300, 1e-9, 1e-7])
+def test_h47_at_the_poles_coordinates_are_finite(y: float, aside: float) -> None:
+    """Where rounding may make the height of the unit normal more than 1."""
+    for x, z in ((aside, 0.0), (0.0, aside), (aside, aside)):
+        u, v = coordinates((x, y, z))
+        assert 0.0 <= u <= 1.0
+        assert v == pytest.approx(0.5 + y / 2, abs=1e-6)
+
+
+def test_h47_no_triangle_of_a_ball_runs_through_the_whole_picture() -> None:
+    """Meshes show the coordinates their files state; those made here double the corners of their seam."""
+    mesh = ball(1.0, 24).mesh(WHITE_LAMBERT)
+    assert mesh.uvs is not None
+    assert np.ptp(mesh.uvs[mesh.faces][:, :, 0], axis=1).max() <= 2 / 24 * np.ptp(mesh.uvs[:, 0])
+
+
+def test_h49_exposure_scales_a_picture_by_powers_of_two_without_a_trace(renderer: Renderer) -> None:
+    """Light times 2^k at an exposure of 2^-k is the same picture. There is no operator but exposure, clipping and the
+    sRGB curve (Siekawa and Mantiuk 2014): no mean that black could make 0, or one bright pixel overturn.
+    """
+    scene = Scene(meshes=(floor(WHITE_LAMBERT),), lights=(light(0, 2, 0, 5.0),), camera=Camera((0, 3, 4), (0, 0, 0)))
+    truth = shoot(renderer, scene, 32, 24, linear=False).pixels
+    assert len(np.unique(truth)) > 20
+    for k in (-30, -7, 7, 30):
+        scaled = dataclasses.replace(scene, lights=(light(0, 2, 0, 5.0 * 2.0**k),), exposure=2.0**-k)
+        np.testing.assert_array_equal(shoot(renderer, scaled, 32, 24, linear=False).pixels, truth)
+
+
+def test_h49_one_firefly_changes_no_other_pixel() -> None:
+    values = np.linspace(0, 1, 10_000, dtype=np.float32)
+    lit = values.copy()
+    lit[5_000] = 1e30
+    np.testing.assert_array_equal(np.delete(encode_srgb(lit), 5_000), np.delete(encode_srgb(values), 5_000))
+    assert encode_srgb(lit)[5_000] == 255

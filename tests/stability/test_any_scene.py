@@ -26,6 +26,7 @@ materials = st.builds(
     reflection=colours,
     transmission=colours,
     ior=st.sampled_from([0.1, 0.7, 1.0, 1.5, 10.0]),
+    priority=st.sampled_from([None, 0, 1]),
     base=st.sampled_from(["phong", "ashikhmin-shirley"]),
     exponent_u=st.sampled_from([0.0, 3.0, 1e9]),
     exponent_v=st.sampled_from([0.0, 300.0, 1e9]),
