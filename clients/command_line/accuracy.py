@@ -5,43 +5,39 @@ from __future__ import annotations
 import argparse
 import shlex
 import sys
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, replace
+from collections.abc import Sequence
+from dataclasses import asdict
 from datetime import UTC, datetime
 from importlib import metadata
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from clients.command_line.accuracy_folder import REFERENCE_FRAME, AccuracyFolder
+from clients.command_line.accuracy_folder import AccuracyFolder
+from clients.command_line.accuracy_steps import measure_missing
 from clients.command_line.accuracy_text import accuracy_text
 from clients.command_line.errors import OK, UsageError
 from clients.command_line.fingerprint import fingerprint
 from clients.command_line.frame_flags import add_frame_flags, frame_request
 from clients.command_line.progress import counting
-from clients.command_line.render import add_threads, check_threads, ready_renderer, write_whole
+from clients.command_line.render import add_threads, check_threads, write_whole
 from clients.command_line.scene_argument import SCENE_HELP, add_scenes_folder, load_scene
 from renderer.camera import Camera
 from renderer.display import Display
 from renderer.quality import Quality
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
     from renderer.accuracy.grid import Setting
-    from renderer.accuracy.record import Accuracy, AccuracyReport, Machine
+    from renderer.accuracy.record import AccuracyReport, Machine
     from renderer.frame import FrameRequest
-    from renderer.pipeline import Renderer
     from renderer.prepared import PreparedScene
 
 DESCRIPTION = """\
 Measure what accuracy costs in time: render SCENE at some fifty settings (samples, kind of map, acuity, anti-aliasing,
 reconstruction, depth, each effect), time each, and hold each against a reference at full resolution.
 
-DIR gets accuracy.json, accuracy.csv, and in frames/ each picture with a map of its error. Times are those of a frame
-whose cell map and samples are all made anew, in an order shuffled anew for each repeat. What was measured is kept at
-once: the same command goes on where it was stopped."""
+DIR gets report.html with plots and pictures, accuracy.json, accuracy.csv, and in frames/ each picture with a map of its
+error. Times are those of a frame whose cell map and samples are all made anew, in an order shuffled anew for each
+repeat. What was measured is kept at once: the same command goes on where it was stopped."""
 
 EXAMPLES = """\
 examples:
@@ -61,9 +57,6 @@ REFERENCE_SAMPLES: Final = 256
 MOST_REFERENCE_SAMPLES: Final = 2048
 QUICK_REFERENCE_SAMPLES: Final = 48
 QUICK_SIZE: Final = (1024, 576)
-
-STORE_BYTES: Final = 16 << 30
-"""Room for the samples of the reference, of the largest frame even; memory is taken only where it is used."""
 
 
 def add(commands: argparse._SubParsersAction[Any]) -> None:
@@ -96,6 +89,7 @@ def add(commands: argparse._SubParsersAction[Any]) -> None:
     )
     add_frame_flags(parser, detail=False)
     parser.set_defaults(size=None)
+    parser.add_argument("--no-report", action="store_true", help="leave out the page and its plots")
     parser.add_argument("--json", action="store_true", help="print accuracy.json")
     add_threads(parser)
     add_scenes_folder(parser)
@@ -118,16 +112,17 @@ def run(arguments: argparse.Namespace) -> int:
         if kept.changed:
             _say(f"{arguments.output} held a measurement of another request ({', '.join(kept.changed)}): starting over")
         try:
-            _measure_missing(arguments, prepared, view, settings, kept)
+            measure_missing(arguments, prepared, view, settings, kept)
         except KeyboardInterrupt:
             _say(f"stopped with {_progress(kept, settings, arguments.repeats)}; the same command goes on")
             raise
         kept.finish()
         report = _report(arguments, prepared, view, settings, machine, kept)
-    _write(arguments.output, report)
     from renderer.accuracy.record import report_json
 
-    print(report_json(report) if arguments.json else accuracy_text(report, arguments.output))
+    files = _write(arguments.output, report, draw=not arguments.no_report)
+
+    print(report_json(report) if arguments.json else accuracy_text(report, files))
     return OK
 
 
@@ -178,127 +173,6 @@ def _request(
     }
 
 
-def _measure_missing(
-    arguments: argparse.Namespace,
-    prepared: PreparedScene,
-    view: FrameRequest,
-    settings: Sequence[Setting],
-    kept: AccuracyFolder,
-) -> None:
-    """Render, compare and time what an earlier run has not."""
-    from renderer.accuracy.timing import timed_frame, turn
-
-    untimed = [
-        (repeat, setting)
-        for repeat in range(arguments.repeats)
-        for setting in turn(settings, repeat)
-        if repeat not in kept.times.get(setting.id, {})
-    ]
-    unmeasured = [setting for setting in settings if setting.id not in kept.measured]
-    if unmeasured and not kept.holds_radiance:
-        _render_reference(arguments, prepared, view, settings, kept)
-    if not unmeasured and not untimed:
-        return
-    renderer = ready_renderer(arguments.threads, keeps=False)
-    with counting("comparing settings", len(settings), done=len(settings) - len(unmeasured)) as tick:
-        _measure(renderer, prepared, view, unmeasured, kept, tick)
-    if untimed and not unmeasured:
-        timed_frame(renderer, prepared, view, settings[0])  # a first frame of a scene is slow
-    total = arguments.repeats * len(settings)
-    with counting("timing settings in turn", total, done=total - len(untimed)) as tick:
-        for repeat, setting in untimed:
-            kept.keep_time(setting.id, repeat, timed_frame(renderer, prepared, view, setting))
-            tick()
-    renderer.close()
-
-
-def _render_reference(
-    arguments: argparse.Namespace,
-    prepared: PreparedScene,
-    view: FrameRequest,
-    settings: Sequence[Setting],
-    kept: AccuracyFolder,
-) -> None:
-    from renderer.accuracy.grid import most_samples
-    from renderer.accuracy.record import Reference
-    from renderer.accuracy.reference import render_reference, rounds
-    from renderer.pipeline import Renderer
-
-    samples, spared = arguments.reference_samples, most_samples(settings)
-    ready_renderer(arguments.threads).close()
-    renderer = Renderer(arguments.threads, store_bytes=STORE_BYTES)
-    with counting("rendering the reference", len(rounds(samples, spared))) as tick:
-        found = render_reference(renderer, prepared, view, samples, spared, tick)
-    renderer.close()
-    reference = Reference(samples, found.standard_error, round(found.seconds, 3), REFERENCE_FRAME)
-    kept.keep_reference(reference, found.radiance, _picture(found.radiance, prepared.scene.exposure)[1])
-
-
-def _measure(
-    renderer: Renderer,
-    prepared: PreparedScene,
-    view: FrameRequest,
-    settings: Sequence[Setting],
-    kept: AccuracyFolder,
-    tick: Callable[[], None],
-) -> None:
-    """Hold settings against the reference, by every metric there is."""
-    if not settings:
-        return
-    from renderer.accuracy.error_map import error_map
-    from renderer.accuracy.measurement import measure
-    from renderer.codec import encode
-
-    exposure = prepared.scene.exposure
-    reference = kept.radiance((view.display.height_px, view.display.width_px))
-    metrics = _metrics(view, _picture(reference, exposure)[0])
-    for setting in settings:
-        measured, radiance = measure(renderer, prepared, view, setting, reference)
-        pixels, picture = _picture(radiance, exposure)
-        for metric in metrics:
-            measured = replace(measured, accuracy=metric(measured.accuracy, pixels))
-        kept.keep_measured(setting.id, measured, picture, encode(error_map(radiance, reference, exposure), "png"))
-        tick()
-
-
-_Metric = Callable[["Accuracy", "NDArray[np.uint8]"], "Accuracy"]
-
-
-def _metrics(view: FrameRequest, reference: NDArray[np.uint8]) -> list[_Metric]:
-    """What fills in the measures of the optional packages that are there."""
-    metrics: list[_Metric] = []
-    if find_spec("flip_evaluator") is not None:
-        from renderer.accuracy.flip import flip_errors
-
-        def flip(accuracy: Accuracy, pixels: NDArray[np.uint8]) -> Accuracy:
-            found = flip_errors(pixels, reference, view.display)
-            return replace(accuracy, flip_mean=found.mean, flip_p99=found.p99)
-
-        metrics.append(flip)
-    if find_spec("pyfvvdp") is not None:
-        from renderer.accuracy.vdp import VisibilityMetric
-        from renderer.eccentricity import eccentricity_deg
-
-        metric = VisibilityMetric(view.display, view.gaze, eccentricity_deg(view.display, view.gaze))
-
-        def visibility(accuracy: Accuracy, pixels: NDArray[np.uint8]) -> Accuracy:
-            found = metric.judge(pixels, reference)
-            return replace(accuracy, jod=found.jod, jod_heat_foveal_p99=found.heat_foveal_p99)
-
-        metrics.append(visibility)
-    return metrics
-
-
-def _picture(radiance: NDArray[np.float32], exposure: float) -> tuple[NDArray[np.uint8], bytes]:
-    """What the screen shows of linear radiance, as 8-bit pixels and as a PNG file."""
-    from renderer.accuracy.measures import shown
-    from renderer.codec import encode
-    from renderer.tonemap import encode_srgb
-
-    pixels = encode_srgb(shown(radiance, exposure))
-    return pixels, encode(pixels, "png")
-
-
 def _report(
     arguments: argparse.Namespace,
     prepared: PreparedScene,
@@ -339,12 +213,22 @@ def _report(
     )
 
 
-def _write(folder: Path, report: AccuracyReport) -> None:
+def _write(folder: Path, report: AccuracyReport, *, draw: bool) -> list[Path]:
+    """Write what was found into its folder, with plots and a page if they can be drawn; the main files."""
+    from clients.report.plotting import can_plot
     from renderer.accuracy.record import report_json
     from renderer.accuracy.table import csv_text
 
-    write_whole(folder / "accuracy.json", report_json(report).encode())
-    write_whole(folder / "accuracy.csv", csv_text(report).encode())
+    files = [folder / "accuracy.json", folder / "accuracy.csv"]
+    for path, text in zip(files, (report_json(report), csv_text(report)), strict=True):
+        write_whole(path, text.encode())
+    if draw and can_plot():
+        from clients.report.accuracy_report import write_report
+
+        with counting("writing the report", len(report.settings)) as tick:
+            page, *_ = write_report(folder, tick)
+        files.insert(0, page)
+    return files
 
 
 def _progress(kept: AccuracyFolder, settings: Sequence[Setting], repeats: int) -> str:

@@ -6,6 +6,9 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, NamedTuple
 
+from clients.report.pareto import pareto_front
+from clients.report.plotting import WANTED, can_plot
+
 if TYPE_CHECKING:
     from renderer.accuracy.record import Accuracy, AccuracyReport, SettingResult
 
@@ -23,45 +26,39 @@ class Column(NamedTuple):
 
 
 COLUMNS: Final = (
-    Column("rel. MSE", lambda found: found.relative_mse, "{:.5f}", True),
-    Column("fovea dB", lambda found: found.foveal_psnr_db, "{:.2f}", False),
+    Column("rms", lambda found: found.rms, "{:.4f}", True),
+    Column("fovea rms", lambda found: found.foveal_rms, "{:.4f}", True),
+    Column("rel. MSE", lambda found: found.relative_mse, "{:.4f}", True),
+    Column("fovea dB", lambda found: found.foveal_psnr_db, "{:.1f}", False),
     Column("fovea max", lambda found: found.foveal_max_error, "{:.3f}", True),
     Column("FLIP", lambda found: found.flip_mean, "{:.4f}", True),
     Column("JOD", lambda found: found.jod, "{:.3f}", False),
 )
 
 
-def accuracy_text(report: AccuracyReport, folder: Path) -> str:
-    """The table, fastest first, with what it is of above it and what its words mean below."""
+def accuracy_text(report: AccuracyReport, files: Sequence[Path]) -> str:
+    """The table, fastest first, with what it is of above it, and what its words mean and the files below."""
     settings = sorted(report.settings, key=lambda setting: setting.time_ms.median)
     columns = [column for column in COLUMNS if any(column.value(setting.accuracy) is not None for setting in settings)]
     best = [pareto_best(settings, column) for column in columns]
     width = max(len(_name(setting)) for setting in settings)
-    head = f"{'':<{width}}{'time [ms]':>11}{'spread':>8}{'rays':>13}"
-    lines = [_title(report), _reference_line(report), "", head + "".join(f"{c.heading:>11} " for c in columns)]
+    head = f"{'':<{width}}{'time [ms]':>10}{'spread':>7}{'M rays':>8}"
+    lines = [_title(report), _reference_line(report), "", head + "".join(f"{c.heading:>10} " for c in columns)]
     for setting in settings:
         times = setting.time_ms
         spread = f"{100 * (times.high - times.low) / times.median:.0f} %"
-        rays = setting.rays.primary + setting.rays.shadow + setting.rays.reflection + setting.rays.refraction
         cells = [_cell(setting, column, front) for column, front in zip(columns, best, strict=True)]
-        lines.append(f"{_name(setting):<{width}}{times.median:>11,.1f}{spread:>8}{rays:>13,}{''.join(cells)}")
-    return "\n".join([*lines, "", *_notes(report, folder)])
+        rays = f"{setting.rays.total / 1e6:.2f}"
+        lines.append(f"{_name(setting):<{width}}{times.median:>10,.1f}{spread:>7}{rays:>8}{''.join(cells)}")
+    return "\n".join([*lines, "", *_notes(report), *map(str, files)])
 
 
 def pareto_best(settings: Sequence[SettingResult], column: Column) -> set[str]:
-    """Ids of the settings that no other beats in both time and `column`, being at least as good in each."""
+    """Ids of the settings that no other beats in time and `column`."""
     sign = 1.0 if column.less_is_better else -1.0
-    points = [
-        (setting.time_ms.median, sign * value, setting.id)
-        for setting in settings
-        if (value := column.value(setting.accuracy)) is not None
-    ]
-    best, least = set(), float("inf")
-    for _, error, name in sorted(points):
-        if error < least:
-            best.add(name)
-            least = error
-    return best
+    known = [(setting, value) for setting in settings if (value := column.value(setting.accuracy)) is not None]
+    front = pareto_front([setting.time_ms.median for setting, _ in known], [sign * value for _, value in known])
+    return {known[index][0].id for index in front}
 
 
 def _title(report: AccuracyReport) -> str:
@@ -90,17 +87,19 @@ def _name(setting: SettingResult) -> str:
 def _cell(setting: SettingResult, column: Column, best: set[str]) -> str:
     value = column.value(setting.accuracy)
     text = "" if value is None else column.form.format(value)
-    return f"{text:>11}{BEST if setting.id in best else ' '}"
+    return f"{text:>10}{BEST if setting.id in best else ' '}"
 
 
-def _notes(report: AccuracyReport, folder: Path) -> list[str]:
+def _notes(report: AccuracyReport) -> list[str]:
     lines = [
         f"{BEST} no setting is both faster and better by this measure. Spread: slowest less fastest, over the median.",
-        "rel. MSE: relative squared error of the luminance on the screen; fovea: within 2.5 deg of the gaze.",
+        "rms: error of luminance, white is 1; rel. MSE: squared, over that of the reference; fovea: within 2.5 deg.",
     ]
     accuracy = report.settings[0].accuracy
     if accuracy.flip_mean is None:
         lines.append("FLIP, which sees colour and contrast, wants the extra 'report': pip install 'gazetrace[report]'")
     if accuracy.jod is None:
         lines.append("JOD, what an eye with this gaze sees, wants the extra 'quality' (not for commercial use)")
-    return [*lines, f"{folder / 'accuracy.json'}, accuracy.csv, frames/"]
+    if not can_plot():
+        lines.append(f"A page with plots and pictures {WANTED}")
+    return lines

@@ -27,7 +27,7 @@ def error_map(frame: NDArray[np.float32], reference: NDArray[np.float32], exposu
     Returns:
         (h, w, 3) uint8 sRGB.
     """
-    error = np.abs((shown(frame, exposure) - shown(reference, exposure)) @ np.array(LUMINANCE))
+    error = np.abs((shown(frame, exposure) - shown(reference, exposure)) @ LUMINANCE)
     place = np.clip(1.0 + np.log10(np.maximum(error, 1e-9)) / DECADES, 0.0, 1.0) * (len(RAMP) - 1)
     stops = np.arange(len(RAMP))
     colours = [np.interp(place, stops, RAMP[:, channel]) for channel in range(3)]

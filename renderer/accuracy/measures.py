@@ -32,16 +32,15 @@ def plain_measures(
         broken = int(np.count_nonzero(~np.isfinite(pixels).all(axis=2)))
         if broken:
             raise ValueError(f"{name}: expected finite pixels, found {broken} that are not")
-    weights = np.array(LUMINANCE)
-    error = (frame.astype(np.float64) - reference) @ weights
     picture, true_picture = shown(frame, exposure), shown(reference, exposure)
-    light, true_light = picture @ weights, true_picture @ weights
+    light, true_light = picture @ LUMINANCE, true_picture @ LUMINANCE
+    error = light - true_light
     true_mean = float(true_light.mean())
     foveal_error = (picture - true_picture)[fovea]
     foveal_rms = _root_mean_square(foveal_error)
     return Accuracy(
         luminance_ratio=float(light.mean()) / true_mean if true_mean > 0.0 else None,
-        relative_mse=float(np.mean((light - true_light) ** 2 / (true_light**2 + DARKEST))),
+        relative_mse=float(np.mean(error**2 / (true_light**2 + DARKEST))),
         rms=_root_mean_square(error) or 0.0,
         foveal_psnr_db=-20.0 * math.log10(foveal_rms) if foveal_rms else None,
         foveal_max_error=float(np.abs(foveal_error).max()) if foveal_error.size else None,

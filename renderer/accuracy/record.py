@@ -56,7 +56,7 @@ class Machine:
 
 @dataclass(frozen=True, slots=True)
 class StandardError:
-    """An estimated standard error, root mean square of linear luminance: over the screen, and in the fovea."""
+    """An estimated standard error of luminance, as a share of white: over the screen, and in the fovea."""
 
     rms: float | None
     foveal_rms: float | None
@@ -100,18 +100,18 @@ class FrameTime:
 
 @dataclass(frozen=True, slots=True)
 class Accuracy:
-    """How far a frame is from the reference. The fovea is what lies within 2.5 deg of the gaze.
+    """How far a frame is from the reference, in what the screen shows: linear light from 0 to 1, white.
 
-    What the screen shows is meant in linear light from 0 to 1, white: a lamp that is a thousand times as bright as
-    white shows as white, and would drown all else if it did not. A frame's own estimate knows no screen.
+    A lamp that is a thousand times as bright as white shows as white; if it did not, its edge would drown all else.
+    The fovea is what lies within 2.5 deg of the gaze.
 
     Attributes:
-        luminance_ratio: mean luminance of what the screen shows over that of the reference.
-        relative_mse: mean of its squared error over the reference's squared luminance plus 0.01.
-        rms: root mean square error of the radiance's luminance, screen or not: what `stated_error` estimates.
-        foveal_psnr_db: peak signal-to-noise ratio of what the screen shows in the fovea [dB].
-        foveal_max_error: largest difference of a colour channel of that.
-        foveal_rms: as `rms`, in the fovea.
+        luminance_ratio: mean luminance over that of the reference.
+        relative_mse: mean of the luminance's squared error over the reference's squared luminance plus 0.01.
+        rms, foveal_rms: root mean square error of luminance over the screen and in the fovea; that part of it which
+            is chance is what `stated_error` estimates.
+        foveal_psnr_db: peak signal-to-noise ratio of the colours in the fovea [dB].
+        foveal_max_error: largest difference of a colour channel in the fovea.
         flip_mean, flip_p99: FLIP, mean and 99th percentile over the screen, 0 to 1; it knows no gaze.
         jod, jod_heat_foveal_p99: FovVideoVDP with the gaze: quality, 10 for no difference; 99th percentile of
             its map of differences within 5 deg of the gaze.

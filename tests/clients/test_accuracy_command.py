@@ -29,7 +29,7 @@ from tests.renderer.accuracy.examples import FAR, NEAR, REPORT
 
 pytestmark = pytest.mark.usefixtures("plain_environment")
 
-TINY = ("--quick", "--size", "48x27", "--reference-samples", "6", "--repeats", "2")
+TINY = ("--quick", "--size", "48x27", "--reference-samples", "6", "--repeats", "2", "--no-report")
 
 
 def measured(capsys: pytest.CaptureFixture[str], *words: str) -> dict[str, Any]:
@@ -156,20 +156,31 @@ def test_two_measurements_never_share_a_folder(tmp_path: Path) -> None:
         pytest.fail("a second run began")
 
 
-def test_the_table_is_by_time_and_marks_what_nothing_beats(tmp_path: Path) -> None:
-    lines = accuracy_text(REPORT, tmp_path).splitlines()
+def test_the_page_is_written_where_it_can_be_drawn(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib", reason="the extra 'report' is not installed")
+    drawn = [word for word in TINY if word != "--no-report"]
+    assert main(["accuracy", "matte", *drawn, "--repeats", "1", "-o", "found"]) == 0
+    assert "found/report.html\nfound/accuracy.json\nfound/accuracy.csv\n" in capsys.readouterr().out
+    assert (tmp_path / "found" / "report.html").stat().st_size > 10_000
+    assert (tmp_path / "found" / "accuracy.svg").exists()
+
+
+def test_the_table_is_by_time_and_marks_what_nothing_beats() -> None:
+    lines = accuracy_text(REPORT, [Path("a/accuracy.json")]).splitlines()
     assert lines[0].startswith("spheres, 64x36, gaze (-20, 18.5): 2 settings, median of 3 on 2 threads of a processor")
     assert lines[1].startswith("reference: 256 samples a pixel in 12.5 s, standard error 0.002 rms: 0.065 of the small")
     heads, fast, slow = (line.split() for line in lines[3:6])
     assert heads[:2] == ["time", "[ms]"]
-    assert fast == ["no", "shadows", "5.0", "0", "%", "900", "0.50000*"]
+    assert fast == ["no", "shadows", "5.0", "0", "%", "0.00", "0.4000*", "0.5000*"]
     assert slow[:4] == ["aligned,", "4", "samples", "[default]"]
-    assert slow[4:] == ["20.0", "62", "%", "17,700", "0.00400*", "41.50*", "0.200*", "0.0500*", "9.700*"]
+    assert slow[4:8] == ["20.0", "62", "%", "0.02"]
+    assert slow[8:] == ["0.0310*", "0.0190*", "0.0040*", "41.5*", "0.200*", "0.0500*", "9.700*"]
+    assert lines[-1] == "a/accuracy.json"
 
 
 def test_what_is_beaten_by_something_as_fast_is_not_best() -> None:
-    (column,) = (column for column in COLUMNS if column.heading == "rel. MSE")
-    (quality,) = (column for column in COLUMNS if column.heading == "JOD")
+    by_heading = {column.heading: column for column in COLUMNS}
+    column, quality = by_heading["rel. MSE"], by_heading["JOD"]
     beaten = replace(NEAR, id="beaten", accuracy=replace(NEAR.accuracy, relative_mse=0.0041, jod=9.6))
     assert pareto_best([beaten, NEAR, FAR], column) == {"aligned-4", "no-shadows"}
     assert pareto_best([beaten, NEAR, FAR], quality) == {"aligned-4"}

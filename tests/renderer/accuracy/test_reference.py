@@ -50,11 +50,11 @@ def test_the_reference_is_the_mean_of_the_samples_after_the_spared_ones(
 
 def test_its_chance_is_none_of_a_settings_chance(renderer: Renderer, scene: PreparedScene) -> None:
     """Variances of independent errors add up: for n of N samples that it shared, they would be taken off."""
-    first = render_reference(renderer, scene, VIEW, 64, SPARED, lambda: None).radiance @ np.array(LUMINANCE)
+    first = render_reference(renderer, scene, VIEW, 64, SPARED, lambda: None).radiance @ LUMINANCE
     renderer.forget_samples()
-    truth = render_reference(renderer, scene, VIEW, 512, SPARED + 64, lambda: None).radiance @ np.array(LUMINANCE)
+    truth = render_reference(renderer, scene, VIEW, 512, SPARED + 64, lambda: None).radiance @ LUMINANCE
     quality = Quality(map="full", samples_per_cell=SPARED)
-    frame = renderer.render(scene, replace(VIEW, quality=quality, linear=True)).pixels @ np.array(LUMINANCE)
+    frame = renderer.render(scene, replace(VIEW, quality=quality, linear=True)).pixels @ LUMINANCE
     error, its = frame - truth, first - truth
     correlation = float((error * its).mean() / np.sqrt((error**2).mean() * (its**2).mean()))
     # what both share is the chance of the truth, 1/576 of a sample's variance, beside 1/32 and 1/64
@@ -65,7 +65,7 @@ def test_it_is_off_the_truth_by_its_standard_error(renderer: Renderer, scene: Pr
     found = render_reference(renderer, scene, VIEW, 48, SPARED, lambda: None)
     renderer.forget_samples()
     truth = render_reference(renderer, scene, VIEW, 512, SPARED + 48, lambda: None)
-    off = (found.radiance - truth.radiance) @ np.array(LUMINANCE)
+    off = (found.radiance - truth.radiance) @ LUMINANCE
     stated, its = found.standard_error.rms, truth.standard_error.rms
     assert stated is not None
     assert its is not None

@@ -1,0 +1,147 @@
+"""The steps of a measurement: the reference, each setting held against it, each setting timed in turn."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from importlib.util import find_spec
+from typing import TYPE_CHECKING, Final
+
+from clients.command_line.accuracy_folder import REFERENCE_FRAME, AccuracyFolder
+from clients.command_line.progress import counting
+from clients.command_line.render import ready_renderer
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from renderer.accuracy.grid import Setting
+    from renderer.accuracy.record import Accuracy
+    from renderer.frame import FrameRequest
+    from renderer.pipeline import Renderer
+    from renderer.prepared import PreparedScene
+
+STORE_BYTES: Final = 16 << 30
+"""Room for the samples of the reference, of the largest frame even; memory is taken only where it is used."""
+
+
+def measure_missing(
+    arguments: argparse.Namespace,
+    prepared: PreparedScene,
+    view: FrameRequest,
+    settings: Sequence[Setting],
+    kept: AccuracyFolder,
+) -> None:
+    """Render, compare and time what an earlier run has not."""
+    from renderer.accuracy.timing import timed_frame, turn
+
+    untimed = [
+        (repeat, setting)
+        for repeat in range(arguments.repeats)
+        for setting in turn(settings, repeat)
+        if repeat not in kept.times.get(setting.id, {})
+    ]
+    unmeasured = [setting for setting in settings if setting.id not in kept.measured]
+    if unmeasured and not kept.holds_radiance:
+        _render_reference(arguments, prepared, view, settings, kept)
+    if not unmeasured and not untimed:
+        return
+    renderer = ready_renderer(arguments.threads, keeps=False)
+    with counting("comparing settings", len(settings), done=len(settings) - len(unmeasured)) as tick:
+        _measure(renderer, prepared, view, unmeasured, kept, tick)
+    if untimed and not unmeasured:
+        timed_frame(renderer, prepared, view, settings[0])  # a first frame of a scene is slow
+    total = arguments.repeats * len(settings)
+    with counting("timing settings in turn", total, done=total - len(untimed)) as tick:
+        for repeat, setting in untimed:
+            kept.keep_time(setting.id, repeat, timed_frame(renderer, prepared, view, setting))
+            tick()
+    renderer.close()
+
+
+def _render_reference(
+    arguments: argparse.Namespace,
+    prepared: PreparedScene,
+    view: FrameRequest,
+    settings: Sequence[Setting],
+    kept: AccuracyFolder,
+) -> None:
+    from renderer.accuracy.grid import most_samples
+    from renderer.accuracy.record import Reference
+    from renderer.accuracy.reference import render_reference, rounds
+    from renderer.pipeline import Renderer
+
+    samples, spared = arguments.reference_samples, most_samples(settings)
+    ready_renderer(arguments.threads).close()
+    renderer = Renderer(arguments.threads, store_bytes=STORE_BYTES)
+    with counting("rendering the reference", len(rounds(samples, spared))) as tick:
+        found = render_reference(renderer, prepared, view, samples, spared, tick)
+    renderer.close()
+    reference = Reference(samples, found.standard_error, round(found.seconds, 3), REFERENCE_FRAME)
+    kept.keep_reference(reference, found.radiance, _picture(found.radiance, prepared.scene.exposure)[1])
+
+
+def _measure(
+    renderer: Renderer,
+    prepared: PreparedScene,
+    view: FrameRequest,
+    settings: Sequence[Setting],
+    kept: AccuracyFolder,
+    tick: Callable[[], None],
+) -> None:
+    """Hold settings against the reference, by every metric there is."""
+    if not settings:
+        return
+    from renderer.accuracy.error_map import error_map
+    from renderer.accuracy.measurement import measure
+    from renderer.codec import encode
+
+    exposure = prepared.scene.exposure
+    reference = kept.radiance((view.display.height_px, view.display.width_px))
+    metrics = _metrics(view, _picture(reference, exposure)[0])
+    for setting in settings:
+        measured, radiance = measure(renderer, prepared, view, setting, reference)
+        pixels, picture = _picture(radiance, exposure)
+        for metric in metrics:
+            measured = replace(measured, accuracy=metric(measured.accuracy, pixels))
+        kept.keep_measured(setting.id, measured, picture, encode(error_map(radiance, reference, exposure), "png"))
+        tick()
+
+
+_Metric = Callable[["Accuracy", "NDArray[np.uint8]"], "Accuracy"]
+
+
+def _metrics(view: FrameRequest, reference: NDArray[np.uint8]) -> list[_Metric]:
+    """What fills in the measures of the optional packages that are there."""
+    metrics: list[_Metric] = []
+    if find_spec("flip_evaluator") is not None:
+        from renderer.accuracy.flip import flip_errors
+
+        def flip(accuracy: Accuracy, pixels: NDArray[np.uint8]) -> Accuracy:
+            found = flip_errors(pixels, reference, view.display)
+            return replace(accuracy, flip_mean=found.mean, flip_p99=found.p99)
+
+        metrics.append(flip)
+    if find_spec("pyfvvdp") is not None:
+        from renderer.accuracy.vdp import VisibilityMetric
+        from renderer.eccentricity import eccentricity_deg
+
+        metric = VisibilityMetric(view.display, view.gaze, eccentricity_deg(view.display, view.gaze))
+
+        def visibility(accuracy: Accuracy, pixels: NDArray[np.uint8]) -> Accuracy:
+            found = metric.judge(pixels, reference)
+            return replace(accuracy, jod=found.jod, jod_heat_foveal_p99=found.heat_foveal_p99)
+
+        metrics.append(visibility)
+    return metrics
+
+
+def _picture(radiance: NDArray[np.float32], exposure: float) -> tuple[NDArray[np.uint8], bytes]:
+    """What the screen shows of linear radiance, as 8-bit pixels and as a PNG file."""
+    from renderer.accuracy.measures import shown
+    from renderer.codec import encode
+    from renderer.tonemap import encode_srgb
+
+    pixels = encode_srgb(shown(radiance, exposure))
+    return pixels, encode(pixels, "png")
