@@ -56,7 +56,7 @@ QUICK_REPEATS: Final = 3
 REFERENCE_SAMPLES: Final = 256
 MOST_REFERENCE_SAMPLES: Final = 2048
 QUICK_REFERENCE_SAMPLES: Final = 48
-QUICK_SIZE: Final = (1024, 576)
+QUICK_SIZE: Final = (960, 540)
 
 
 def add(commands: argparse._SubParsersAction[Any]) -> None:

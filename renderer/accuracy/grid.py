@@ -34,6 +34,7 @@ class Extent:
     Attributes:
         samples: camera rays a cell, by map.
         scales: factors on the cells' width.
+        models: acuity models beside the default one.
         regular, adaptive, smooth: camera rays a cell with regular and adaptive anti-aliasing and with smooth
             reconstruction.
         shadow_samples: shadow rays a camera ray to each light with a size.
@@ -43,6 +44,7 @@ class Extent:
 
     samples: tuple[tuple[str, tuple[int, ...]], ...]
     scales: tuple[float, ...]
+    models: tuple[str, ...]
     regular: tuple[int, ...]
     adaptive: tuple[int, ...]
     smooth: tuple[int, ...]
@@ -54,6 +56,7 @@ class Extent:
 FULL: Final = Extent(
     samples=tuple((kind, (1, 2, 4, 8, 16, 32)) for kind in MAPS),
     scales=(0.5, 0.7, 1.4, 2.0, 3.0, 4.0, 8.0),
+    models=tuple(model for model in MODELS if model != Acuity().model),
     regular=(4, 16),
     adaptive=(8, 16, 32),
     smooth=(1, 4, 16),
@@ -66,6 +69,7 @@ FULL: Final = Extent(
 QUICK: Final = Extent(
     samples=(("aligned", (1, 2, 4, 8)), ("scanline", (4,)), ("full", (1, 4))),
     scales=(0.5, 2.0, 4.0),
+    models=("geisler-perry", "guenter"),
     regular=(4,),
     adaptive=(8,),
     smooth=(4,),
@@ -110,9 +114,8 @@ def _acuities(extent: Extent) -> Iterator[Setting]:
     for scale in extent.scales:
         quality = replace(default, acuity=Acuity(scale=scale))
         yield Setting(f"scale-{scale:g}".replace(".", "-"), f"cells {scale:g} times as wide", "acuity_scale", quality)
-    for model in MODELS:
-        if model != default.acuity.model:
-            yield Setting(f"acuity-{model}", f"acuity {model}", "acuity_model", replace(default, acuity=Acuity(model)))
+    for model in extent.models:
+        yield Setting(f"acuity-{model}", f"acuity {model}", "acuity_model", replace(default, acuity=Acuity(model)))
 
 
 def _samplings(extent: Extent) -> Iterator[Setting]:

@@ -17,11 +17,15 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.accuracy.measures import shown
 from renderer.accuracy.record import StandardError
-from renderer.frame import Frame, FrameRequest
+from renderer.eccentricity import eccentricity_deg
+from renderer.frame import FrameRequest
 from renderer.pipeline import Renderer
 from renderer.prepared import PreparedScene
 from renderer.quality import Quality
+from renderer.standard_error import FOVEA_DEG
+from renderer.store import LUMINANCE
 
 DEPTH: Final = 16
 """Mirrors and boundaries a ray may meet; by then hardly any weighs enough to change a pixel."""
@@ -36,7 +40,7 @@ class ReferenceFrame:
 
     Attributes:
         radiance: (h, w, 3) float32, linear.
-        standard_error: of its luminance.
+        standard_error: of the luminance that the screen shows.
         seconds: that it took [s].
     """
 
@@ -46,8 +50,9 @@ class ReferenceFrame:
 
 
 def rounds(samples: int, spared: int) -> tuple[int, ...]:
-    """How many samples a pixel has after each step, the spared ones first."""
-    return (*range(spared, spared + samples, ROUND), spared + samples)
+    """How many samples a pixel has after each step, the spared ones first; two steps at least for the others."""
+    step = min(ROUND, samples // 2)
+    return (*range(spared, spared + samples, step), spared + samples)
 
 
 def render_reference(
@@ -69,17 +74,33 @@ def render_reference(
         tick: called after each step of `rounds`.
     """
     began = time.perf_counter()
-    total = spared + samples
-    quality = Quality(map="full", samples_per_cell=total, max_depth=DEPTH)
+    quality = Quality(map="full", samples_per_cell=spared + samples, max_depth=DEPTH)
     request = replace(view, quality=quality, linear=True)
-    frames: list[Frame] = []
-    for number in rounds(samples, spared):
+    numbers = rounds(samples, spared)
+    middle = numbers[len(numbers) // 2]
+    totals: dict[int, NDArray[np.float64]] = {}
+    for number in numbers:
         frame = renderer.render(prepared, replace(request, samples=number))
-        frames = [*frames[:1], frame]
+        if number in (numbers[0], middle, numbers[-1]):
+            totals[number] = number * frame.pixels.astype(np.float64)
         tick()
-    first, last = frames
-    mean = (total * last.pixels.astype(np.float64) - spared * first.pixels.astype(np.float64)) / samples
-    fewer = math.sqrt(total / samples)
-    rms, foveal_rms = last.cost.rms_error, last.cost.foveal_rms_error
-    error = StandardError(None if rms is None else rms * fewer, None if foveal_rms is None else foveal_rms * fewer)
-    return ReferenceFrame(np.maximum(mean, 0.0).astype(np.float32), error, time.perf_counter() - began)
+    first, half, last = totals[numbers[0]], totals[middle], totals[numbers[-1]]
+    radiance = np.maximum((last - first) / samples, 0.0).astype(np.float32)
+    early, late = middle - spared, numbers[-1] - middle
+    parts = (half - first) / early, (last - half) / late
+    error = _standard_error(parts, (early, late), view, prepared.scene.exposure)
+    return ReferenceFrame(radiance, error, time.perf_counter() - began)
+
+
+def _standard_error(
+    parts: tuple[NDArray[np.float64], NDArray[np.float64]],
+    samples: tuple[int, int],
+    view: FrameRequest,
+    exposure: float,
+) -> StandardError:
+    """Of the mean of all samples, by how far the means of its earlier and of its later samples lie apart."""
+    earlier, later = (shown(part.astype(np.float32), exposure) @ LUMINANCE for part in parts)
+    share = math.sqrt(samples[0] * samples[1]) / sum(samples)
+    squares = (share * (earlier - later)) ** 2
+    fovea = squares[eccentricity_deg(view.display, view.gaze) <= FOVEA_DEG]
+    return StandardError(math.sqrt(float(squares.mean())), math.sqrt(float(fovea.mean())) if fovea.size else None)

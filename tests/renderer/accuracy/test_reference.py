@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from renderer.accuracy.measures import shown
 from renderer.accuracy.reference import DEPTH, ROUND, render_reference, rounds
 from renderer.display import Display
 from renderer.frame import FrameRequest
@@ -28,8 +29,9 @@ def scene() -> PreparedScene:
 
 def test_steps_begin_with_the_spared_samples_and_end_with_all() -> None:
     assert rounds(40, 8) == (8, 24, 40, 48)
-    assert rounds(ROUND, 32) == (32, 48)
-    assert rounds(2, 1) == (1, 3)
+    assert rounds(ROUND, 32) == (32, 40, 48)
+    assert rounds(2, 1) == (1, 2, 3)
+    assert rounds(3, 1) == (1, 2, 3, 4)
 
 
 def test_the_reference_is_the_mean_of_the_samples_after_the_spared_ones(
@@ -65,7 +67,8 @@ def test_it_is_off_the_truth_by_its_standard_error(renderer: Renderer, scene: Pr
     found = render_reference(renderer, scene, VIEW, 48, SPARED, lambda: None)
     renderer.forget_samples()
     truth = render_reference(renderer, scene, VIEW, 512, SPARED + 48, lambda: None)
-    off = (found.radiance - truth.radiance) @ LUMINANCE
+    exposure = scene.scene.exposure
+    off = (shown(found.radiance, exposure) - shown(truth.radiance, exposure)) @ LUMINANCE
     stated, its = found.standard_error.rms, truth.standard_error.rms
     assert stated is not None
     assert its is not None
