@@ -22,7 +22,7 @@ from renderer.surface import triangle_surface, weights_at
 from tests.renderer.drawing import BLACK, WHITE_LAMBERT, aim, ball_mesh, floor, light, pixel, shoot
 from tests.stability.shapes import Floats, directions, prepared_mesh, rotation
 
-SPREAD, LONE, EACH = 50_000, 200, 250
+SPREAD, LONE, EACH = 50_000, 50, 1000
 """Triangles of a row, spread out in one scene or each in a scene of its own, and how many rays leave each of the latter
 on either side."""
 
