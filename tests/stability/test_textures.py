@@ -62,6 +62,7 @@ def test_h46_between_texels(renderer: Renderer, u: float, share_of_b: float) -> 
 
 @pytest.mark.parametrize("u", [math.inf, -math.inf, math.nan, 1e300])
 def test_h46_coordinates_that_are_no_number_show_one_place(renderer: Renderer, u: float) -> None:
+    """The corner, as if they were 0: never what lies outside the picture."""
     texture = picture([[10, 60], [120, 250]])
     np.testing.assert_array_equal(look_up(renderer, texture, u, 0.25), look_up(renderer, texture, 0.0, 0.25))
 
@@ -83,6 +84,9 @@ def test_h47_the_seam_and_the_poles_of_a_sphere(renderer: Renderer) -> None:
 
 @pytest.mark.parametrize(("width", "height"), [(1, 5), (5, 1), (3, 5), (7, 2)])
 def test_h48_texel_centres_of_odd_pictures(renderer: Renderer, width: int, height: int) -> None:
+    """Of files of every kind, grey, 16 bits deep, with palettes, empty or missing: tests/renderer/test_codec.py and
+    test_scene_file.py.
+    """
     pixels = np.random.default_rng(3).integers(0, 256, (height, width, 3), dtype=np.uint8)
     for row in range(height):
         for column in range(width):
