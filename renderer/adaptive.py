@@ -142,7 +142,7 @@ def _decide(
     until: NDArray[np.int32],
 ) -> None:
     """Write how many samples each chosen cell is to have next; see `Verdicts.next_round`."""
-    total, squares, count = samples.total, samples.square, samples.number
+    total, squares, count = samples.total, spread.square, samples.number
     lows, highs, settled = spread.low, spread.high, spread.settled
     height, width = mask.shape
     for index in range(len(chosen)):

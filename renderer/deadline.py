@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from renderer.acuity import MAX_SCALE, Acuity
 from renderer.frame import FrameRequest
-from renderer.pace import Rates
+from renderer.growth import Growth
+from renderer.pace import LEAST_SAMPLES, Rates
 from renderer.quality import Quality
 from renderer.store import SampleStore, held_by_number
 
@@ -77,6 +78,13 @@ def affordable_samples(
         return wanted
     held = held_by_number(store.samples.number, store.spread.settled, slots, wanted)
     return choose_samples(held, wanted, request.display.pixels, rates, NS_PER_MS * deadline_ms - gone_ns)
+
+
+def seen(rates: Rates, growth: Growth) -> Rates:
+    """`rates` in the light of what was traced for this very frame, if that was enough to tell."""
+    if growth.asked < LEAST_SAMPLES:
+        return rates
+    return rates._replace(sample=growth.trace_ns / growth.asked)
 
 
 def samples_lacking(held: NDArray[np.float64], wanted: int) -> float:

@@ -87,12 +87,15 @@ class FrameCost:
         acuity_scale: factor on the cells' width that was used.
         deadline_ms: time that it was given [ms], None for as much as it takes.
         deadline_met: whether it was finished in time; None without a deadline.
+        max_error: what its stated error was to be at most, None for no bound.
+        error_met: whether it is; None without a bound.
         cells_traced, cells_reused: cells traced for this frame, and taken from the sample store as they were.
         rays: rays traced for this frame.
         effects: names of the effects that the scene calls for and that ran.
         effect_reasons: what in the scene calls for each, one line.
-        rms_error, foveal_rms_error: estimated standard error of the linear frame over the screen and
-            within 2.5 deg of the gaze; None with fewer than two samples in any cell (or nothing there).
+        rms_error, foveal_rms_error: estimated standard error of the linear frame, as a share of white, over the
+            screen and within 2.5 deg of the gaze (None where no cell is there); see `standard_error`.
+        guessed_error: share of the screen, 0 to 1, whose error is a guess, since its cells hold one sample.
         rejected_samples: samples that were not finite and count as black; 0 unless something is broken.
         time_ms: stages.
     """
@@ -107,13 +110,16 @@ class FrameCost:
     acuity_scale: float
     deadline_ms: float | None
     deadline_met: bool | None
+    max_error: float | None
+    error_met: bool | None
     cells_traced: int
     cells_reused: int
     rays: RayCounts
     effects: tuple[str, ...]
     effect_reasons: tuple[str, ...]
-    rms_error: float | None
+    rms_error: float
     foveal_rms_error: float | None
+    guessed_error: float
     rejected_samples: int
     time_ms: StageTimes
 

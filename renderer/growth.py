@@ -62,7 +62,7 @@ class _Tracer:
     ) -> int:
         """Trace samples first .. until - 1 of each of the `chosen` squares; return how many these are."""
         prepared, view = self._scene
-        samples, spread = self._store.samples, self._store.spread
+        samples, spread, white = self._store.samples, self._store.spread, self._store.white
         starts = block_starts(until - first, block_rays(prepared, self._quality))
         counts = [RayCounts()] * (len(starts) - 1)
         rejected = [0] * (len(starts) - 1)
@@ -71,7 +71,7 @@ class _Tracer:
             part = slice(starts[block], starts[block + 1])
             some = Cells(squares.x, squares.y, squares.side, chosen[part], first[part], until[part])
             radiance, counts[block] = trace_cells(prepared, view, some, self._quality)
-            rejected[block] = add_samples(samples, spread, squares.slots, some.chosen, some.until, radiance)
+            rejected[block] = add_samples(samples, spread, white, squares.slots, some.chosen, some.until, radiance)
 
         began = time.perf_counter_ns()
         self._pool.run(trace_block, len(counts))

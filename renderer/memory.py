@@ -62,11 +62,19 @@ class Memory:
         return self.maps.get(_map_key(display, quality, gaze), build)
 
     def store(self, prepared: PreparedScene, request: FrameRequest, numbered: NumberedMap) -> SampleStore:
-        """The samples of a view: shared by all its aligned and full maps, but a scanline map has its own."""
-        key = _store_key(prepared, request, numbered)
-        return self.stores.get(
-            key, lambda: SampleStore(slots_needed(numbered.cells), request.quality.antialiasing == "adaptive")
-        )[0]
+        """The samples of a view: shared by all its aligned and full maps, but a scanline map has its own.
+
+        A frame that is to have no more samples than its error calls for starts without any.
+        """
+        quality = request.quality
+
+        def make() -> SampleStore:
+            white = 1.0 / prepared.scene.exposure
+            return SampleStore(slots_needed(numbered.cells), quality.antialiasing == "adaptive", white)
+
+        if quality.max_error is not None and quality.deadline_ms is None and request.samples is None:
+            return make()
+        return self.stores.get(_store_key(prepared, request, numbered), make)[0]
 
     def works(self, prepared: PreparedScene, request: FrameRequest, wanted: int) -> Iterator[Work]:
         """What the frame takes with each acuity, finest first: maps that are there are counted, others forecast.

@@ -8,20 +8,21 @@ import time
 from renderer.acuity import Acuity
 from renderer.allocator import keep_freed_memory
 from renderer.cellmap import CellMap
-from renderer.deadline import NS_PER_MS, affordable_samples, fitted
+from renderer.deadline import NS_PER_MS, affordable_samples, fitted, seen
 from renderer.display import Display
 from renderer.eccentricity import eccentricity_deg
 from renderer.forced import with_effects
 from renderer.frame import Frame, FrameCost, FrameRequest, StageTimes
 from renderer.gaze import Gaze
-from renderer.growth import grow
+from renderer.growth import Growth, grow
 from renderer.memory import Memory
 from renderer.pace import Pace
 from renderer.prepared import PreparedScene, prepare
 from renderer.quality import MAPS, RECONSTRUCTIONS, Quality
 from renderer.reconstruction import reconstruct
+from renderer.refinement import refine
 from renderer.smooth import reconstruct_smooth
-from renderer.standard_error import standard_errors
+from renderer.standard_error import StatedError, stated_error
 from renderer.warmup import every_effect
 from renderer.whitted import view_of
 from renderer.workers import WorkerPool
@@ -77,6 +78,7 @@ class Renderer:
 
         The same request gives the same bytes, on any number of threads and whatever was rendered before; but
         one with a deadline or a limited number of `samples` shows what further samples earlier frames have left.
+        One with a `max_error` and neither of these is traced anew: what others have left would change its error.
 
         Args:
             prepared: the scene.
@@ -90,8 +92,8 @@ class Renderer:
         prepared = with_effects(prepared, request.quality.effects)
         pool = self._pool.until(abandon)
         rates = self._pace.rates(prepared, request)
-        wanted = request.quality.samples_per_cell if request.samples is None else request.samples
-        request = fitted(request, self._memory.works(prepared, request, wanted), rates)
+        most = request.quality.samples_per_cell if request.samples is None else request.samples
+        request = fitted(request, self._memory.works(prepared, request, most), rates)
         quality = request.quality
         numbered, cached = self._memory.map(request.display, quality, request.gaze, pool)
         cells, slots = numbered.cells, numbered.slots
@@ -100,16 +102,23 @@ class Renderer:
         store = self._memory.store(prepared, request, numbered)
         with store.held(abandon) as samples:
             entered = time.perf_counter_ns()
-            wanted = affordable_samples(request, slots, store, wanted, rates, entered - began)
-            growth = grow(prepared, view, cells, slots, store, quality, wanted, pool)
+
+            def grow_to(samples_each: int) -> Growth:
+                return grow(prepared, view, cells, slots, store, quality, samples_each, pool)
+
+            def judge() -> StatedError:
+                return stated_error(request.display, request.gaze, cells, slots, samples, prepared.scene.exposure, pool)
+
+            def affordable(growth: Growth) -> int:
+                gone_ns = time.perf_counter_ns() - began
+                return affordable_samples(request, slots, store, most, seen(rates, growth), gone_ns)
+
+            growth, error, wanted = refine(
+                grow_to, judge, affordable, most, quality.max_error, hurried=quality.deadline_ms is not None
+            )
             done = time.perf_counter_ns()
             rebuild = reconstruct_smooth if quality.reconstruction == "smooth" else reconstruct
             pixels = rebuild(cells, slots, samples, prepared.scene.exposure, request.linear, pool)
-            rms, foveal_rms = (
-                standard_errors(request.display, request.gaze, cells, slots, samples, pool)
-                if growth.fewest >= 2
-                else (None, None)
-            )
         finished = time.perf_counter_ns()
         frame_ns = finished - entered - growth.trace_ns
         self._pace.learn(prepared, request, None if cached else mapped - began, frame_ns, growth.trace_ns, growth.asked)
@@ -124,13 +133,16 @@ class Renderer:
             acuity_scale=quality.acuity.scale,
             deadline_ms=quality.deadline_ms,
             deadline_met=None if quality.deadline_ms is None else finished - began <= NS_PER_MS * quality.deadline_ms,
+            max_error=quality.max_error,
+            error_met=None if quality.max_error is None else error.within(quality.max_error),
             cells_traced=growth.cells,
             cells_reused=cells.cells - growth.cells,
             rays=growth.rays,
             effects=prepared.plan.names,
             effect_reasons=tuple(effect.reason for effect in prepared.plan.effects),
-            rms_error=rms,
-            foveal_rms_error=foveal_rms,
+            rms_error=error.rms,
+            foveal_rms_error=error.foveal_rms,
+            guessed_error=error.guessed,
             rejected_samples=growth.rejected,
             time_ms=StageTimes(*(ns / NS_PER_MS for ns in (mapped - began, done - mapped, finished - done))),
         )
@@ -151,6 +163,7 @@ class Renderer:
         tabulated = Acuity(model="watson")
         for quality in (
             Quality(deadline_ms=1.0),
+            Quality(max_error=1.0),
             Quality(deadline_ms=1.0, acuity=tabulated),
             Quality(map="scanline", acuity=tabulated),
             Quality(antialiasing="adaptive", samples_per_cell=8),

@@ -15,6 +15,10 @@ MAX_SAMPLES = 4096
 MAX_DEPTH = 64
 MAX_BUCKET_PX = 512
 MAX_DEADLINE_MS = 600_000.0
+MAX_ERROR = 1e6
+
+ERROR_SAMPLES = 64
+"""Most samples a cell for a frame that is asked for by its error, where the request does not state how many."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +43,9 @@ class Quality:
         deadline_ms: time for the whole frame, above 0 to 600,000 [ms]: fewer samples are traced and, if one a
             cell is too many still, cells made coarser, until the frame should be done in time, going by what
             such frames have taken on this machine. None: as much time as it takes.
+        max_error: what the frame's stated standard error may be at most, over the screen and in the fovea alike,
+            above 0 to 1e6 [shares of white]: no more samples are traced than it takes, of `samples_per_cell` at
+            most. None: all of them.
 
     Raises:
         SettingsError: naming the field, for a value out of range.
@@ -54,6 +61,7 @@ class Quality:
     acuity: Acuity = field(default_factory=Acuity)
     reconstruction: str = "nearest"
     deadline_ms: float | None = None
+    max_error: float | None = None
 
     def __post_init__(self) -> None:
         require_choice("quality.map", self.map, MAPS)
@@ -66,3 +74,5 @@ class Quality:
         require_choice("quality.reconstruction", self.reconstruction, RECONSTRUCTIONS)
         if self.deadline_ms is not None:
             require_number("quality.deadline_ms", self.deadline_ms, 0.0, MAX_DEADLINE_MS, open_low=True)
+        if self.max_error is not None:
+            require_number("quality.max_error", self.max_error, 0.0, MAX_ERROR, open_low=True)

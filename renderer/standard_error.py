@@ -1,8 +1,22 @@
-"""How accurate a frame is by its own account: the standard error of its cells' means."""
+"""How accurate a frame is by its own account: the standard error of its cells' means.
+
+The account is of the error that sampling makes: by how much a cell's mean differs from what endless samples of
+that cell would give. What is lost since cells are wider than pixels is not in it.
+
+It is of luminance times exposure, as a share of white, and each sample counts up to white: one ray that hits a
+highlight of a thousand times white would otherwise outweigh the rest of the screen, the more samples the worse.
+The samples' variance over their number is the squared error of `stochastic` samples, to some percent over some hundred
+cells. It bounds that of `regular` ones, and of shadow rays to lights with a size, from above: these are spread so that
+they err less.
+
+One sample cannot tell how far off it is. Its cell is judged by its neighbours: by `NEIGHBOURS_SHARE` of the mean
+squared difference from those beside, above and below. That is a guess, good to a factor of two.
+"""
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,42 +27,81 @@ from renderer.display import Display
 from renderer.eccentricity import EyeGeometry, eye_geometry
 from renderer.gaze import Gaze, GazeBucket
 from renderer.kernel import kernel
-from renderer.store import LUMINANCE, Samples
+from renderer.store import Samples
 from renderer.workers import Workers
 
 FOVEA_DEG = 2.5
 """Half-angle of the fovea around the gaze [deg]."""
 
+NEIGHBOURS_SHARE = 0.25
+"""Squared error of a cell's central sample over its mean squared difference from the cells around it. It is 0.5 where
+these have nothing to do with each other (each differs from its mean by their common variance, from each other by
+twice that), and 0.14 where straight edges between flat areas pass through, of which the centres see all or nothing."""
+
 CHUNK_CELLS = 65_536
 """Cells summed together."""
 
 
-def standard_errors(
-    display: Display, gaze: Gaze, cell_map: CellMap, slots: NDArray[np.int64], samples: Samples, pool: Workers
-) -> tuple[float, float | None]:
-    """Root mean square over area of the standard error of the cells' linear luminance.
+class StatedError(NamedTuple):
+    """Standard error of a frame by its own account, as shares of white.
+
+    Attributes:
+        rms: root mean square over the screen.
+        foveal_rms: over the cells whose centre is within 2.5 deg of the gaze; None where there is none.
+        guessed: share of the screen, 0 to 1, whose cells hold one sample and were judged by their neighbours.
+    """
+
+    rms: float
+    foveal_rms: float | None
+    guessed: float
+
+    def within(self, bound: float) -> bool:
+        """Whether both errors are known, not guessed, to be at most `bound`."""
+        return self.guessed == 0.0 and self.greatest <= bound
+
+    @property
+    def greatest(self) -> float:
+        """The greater one."""
+        return self.rms if self.foveal_rms is None else max(self.rms, self.foveal_rms)
+
+
+def stated_error(
+    display: Display,
+    gaze: Gaze,
+    cell_map: CellMap,
+    slots: NDArray[np.int64],
+    samples: Samples,
+    exposure: float,
+    pool: Workers,
+) -> StatedError:
+    """The standard error of a frame's linear luminance, by its samples.
 
     Args:
         display, gaze: where the fovea is.
         cell_map, slots: the cells and their slots in `samples`.
-        samples: sums and counts, every cell with at least two samples.
+        samples: sums and counts, every cell with at least one sample.
+        exposure: factor from radiance to shares of white.
         pool: threads; the sums do not depend on their number.
-
-    Returns:
-        Over the screen, and over cells whose centre is within 2.5 deg of the gaze; None where there is no
-        such cell.
     """
     eye = eye_geometry(display, Acuity(), GazeBucket(gaze.x, gaze.y, 0))
     chunks = -(-cell_map.cells // CHUNK_CELLS)
-    sums = np.zeros((chunks, 4))
+    sums = np.zeros((chunks, 5))
 
     def add(chunk: int) -> None:
-        part = slice(chunk * CHUNK_CELLS, (chunk + 1) * CHUNK_CELLS)
-        _sum_errors(eye, cell_map.x[part], cell_map.y[part], cell_map.side[part], slots[part], samples, sums[chunk])
+        first = chunk * CHUNK_CELLS
+        last = min(first + CHUNK_CELLS, cell_map.cells)
+        _sum_errors(
+            eye, cell_map.x, cell_map.y, cell_map.side, cell_map.mask, slots, samples, first, last,
+            sums[chunk],
+        )  # fmt: skip
 
     pool.run(add, chunks)
-    screen, area, fovea, foveal_area = (float(total) for total in sums.sum(axis=0))
-    return math.sqrt(screen / area), math.sqrt(fovea / foveal_area) if foveal_area else None
+    screen, area, fovea, foveal_area, guessed = (float(total) for total in sums.sum(axis=0))
+    return StatedError(
+        exposure * math.sqrt(screen / area),
+        exposure * math.sqrt(fovea / foveal_area) if foveal_area else None,
+        guessed / area,
+    )
 
 
 @kernel
@@ -56,28 +109,45 @@ def _sum_errors(
     eye: EyeGeometry,
     x: NDArray[np.int32],
     y: NDArray[np.int32],
-    side: NDArray[np.int32],
+    sides: NDArray[np.int32],
+    mask: NDArray[np.int32],
     slots: NDArray[np.int64],
     samples: Samples,
+    first: int,
+    last: int,
     sums: NDArray[np.float64],
 ) -> None:
-    """Squared error times area and area, over all cells and over those in the fovea, into `sums`, (4,)."""
-    total, square, count = samples.total, samples.square, samples.number
+    """Squared error times area and area of cells `first` to `last` - 1, those of cells in the fovea, and the area of
+    cells with one sample, into `sums`, (5,).
+    """
+    shown, square, count = samples.shown, samples.square, samples.number
+    height, width = mask.shape
     distance2 = eye.distance * eye.distance
     limit = math.cos(math.radians(FOVEA_DEG)) ** 2
     reach = limit * (eye.gaze_x * eye.gaze_x + eye.gaze_y * eye.gaze_y + distance2)
-    for cell in range(len(slots)):
-        slot = slots[cell]
+    for cell in range(first, last):
+        slot, side = slots[cell], sides[cell]
         n = float(count[slot])
-        red, green, blue = total[slot, 0], total[slot, 1], total[slot, 2]
-        mean = (LUMINANCE[0] * red + LUMINANCE[1] * green + LUMINANCE[2] * blue) / n
-        area = float(side[cell]) * float(side[cell])
-        error = max(0.0, square[slot] / n - mean * mean) / (n - 1.0) * area
-        sums[0] += error
+        mean = np.float64(shown[slot]) / n
+        area = float(side) * float(side)
+        if n > 1.0:
+            error = max(0.0, np.float64(square[slot]) / n - mean * mean) / (n - 1.0)
+        else:
+            differences, beside = 0.0, 0
+            for place in range(4):
+                px = x[cell] + (side // 2 if place >= 2 else -1 if place == 0 else side)
+                py = y[cell] + (side // 2 if place < 2 else -1 if place == 2 else side)
+                if px >= 0 and py >= 0 and px < width and py < height:
+                    other = slots[mask[py, px]]
+                    differences += (np.float64(shown[other]) / float(count[other]) - mean) ** 2
+                    beside += 1
+            error = NEIGHBOURS_SHARE * differences / beside if beside > 0 else 0.0
+            sums[4] += area
+        sums[0] += error * area
         sums[1] += area
-        px = (x[cell] + 0.5 * side[cell] - eye.width_px / 2) * eye.pitch_x
-        py = (y[cell] + 0.5 * side[cell] - eye.height_px / 2) * eye.pitch_y
-        along = px * eye.gaze_x + py * eye.gaze_y + distance2
-        if along > 0.0 and along * along >= reach * (px * px + py * py + distance2):
-            sums[2] += error
+        px_cm = (x[cell] + 0.5 * side - eye.width_px / 2) * eye.pitch_x
+        py_cm = (y[cell] + 0.5 * side - eye.height_px / 2) * eye.pitch_y
+        along = px_cm * eye.gaze_x + py_cm * eye.gaze_y + distance2
+        if along > 0.0 and along * along >= reach * (px_cm * px_cm + py_cm * py_cm + distance2):
+            sums[2] += error * area
             sums[3] += area

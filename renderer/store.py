@@ -7,6 +7,7 @@ in two frames ends with the same bits as one that got them in one.
 
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -41,11 +42,13 @@ class Samples(NamedTuple):
 
     Attributes:
         total: (n, 3) float32 sum of the radiance of its samples.
-        square: (n,) float32 sum of the squared luminance of its samples.
+        shown: (n,) float32 sum of the luminance of its samples, of each no more than white.
+        square: (n,) float32 sum of the squares of these.
         number: (n,) int32 how many samples.
     """
 
     total: NDArray[np.float32]
+    shown: NDArray[np.float32]
     square: NDArray[np.float32]
     number: NDArray[np.int32]
 
@@ -55,28 +58,38 @@ class Spread(NamedTuple):
 
     Attributes:
         low, high: (n,) float32 least and greatest luminance among the first `FIRST_ROUND` samples.
+        square: (n,) float32 sum of the squared luminance of its samples.
         settled: (n,) uint8: 1 for a cell that needs no more samples.
     """
 
     low: NDArray[np.float32]
     high: NDArray[np.float32]
+    square: NDArray[np.float32]
     settled: NDArray[np.uint8]
 
 
 class SampleStore:
-    """Samples of one view, for one render at a time."""
+    """Samples of one view, for one render at a time.
 
-    def __init__(self, slots: int, adaptive: bool = False) -> None:
+    Attributes:
+        samples, spread: what is known of cells.
+        white: luminance that the screen shows as white.
+    """
+
+    def __init__(self, slots: int, adaptive: bool = False, white: float = math.inf) -> None:
         """Room for `slots` cells; memory is taken from the system only where it is written."""
+        self.white = np.float32(min(white, float(BRIGHTEST)))
         self._lock = threading.Lock()
         decided = slots if adaptive else 0
         self.spread = Spread(
             low=np.zeros(decided, dtype=np.float32),
             high=np.zeros(decided, dtype=np.float32),
+            square=np.zeros(decided, dtype=np.float32),
             settled=np.zeros(decided, dtype=np.uint8),
         )
         self.samples = Samples(
             total=np.zeros((slots, 3), dtype=np.float32),
+            shown=np.zeros(slots, dtype=np.float32),
             square=np.zeros(slots, dtype=np.float32),
             number=np.zeros(slots, dtype=np.int32),
         )
@@ -275,6 +288,7 @@ def _count_held(
 def add_samples(
     samples: Samples,
     spread: Spread,
+    white: np.float32,
     slots: NDArray[np.int64],
     cells: NDArray[np.int32],
     until: NDArray[np.int32],
@@ -283,7 +297,7 @@ def add_samples(
     """Add the radiance of the next samples of some cells, in the order of the samples.
 
     Args:
-        samples, spread: the store.
+        samples, spread, white: the store.
         slots: (n,) int64 slot of each cell of the map.
         cells: (c,) int32 cells that were sampled.
         until: (c,) int32 samples each of them has then.
@@ -292,14 +306,16 @@ def add_samples(
     Returns:
         How many samples were not a number or negative, and count as black.
     """
-    total, squares, count = samples.total, samples.square, samples.number
-    low, high = spread.low, spread.high
+    total, shown, shown_squares, count = samples.total, samples.shown, samples.square, samples.number
+    low, high, squares = spread.low, spread.high, spread.square
+    decided = len(low) > 0
     rejected = 0
     row = 0
     for index in range(len(cells)):
         slot = slots[cells[index]]
         red, green, blue = total[slot, 0], total[slot, 1], total[slot, 2]
-        square = squares[slot]
+        bright, bright_square = shown[slot], shown_squares[slot]
+        square = squares[slot] if decided else np.float32(0.0)
         for sample in range(count[slot], until[index]):
             r, g, b = radiance[row, 0], radiance[row, 1], radiance[row, 2]
             row += 1
@@ -308,14 +324,19 @@ def add_samples(
                 r = g = b = np.float32(0.0)
             r, g, b = min(r, BRIGHTEST), min(g, BRIGHTEST), min(b, BRIGHTEST)
             luminance = np.float32(LUMINANCE[0]) * r + np.float32(LUMINANCE[1]) * g + np.float32(LUMINANCE[2]) * b
-            if sample < FIRST_ROUND and len(low) > 0:
+            if sample < FIRST_ROUND and decided:
                 low[slot] = min(low[slot], luminance) if sample > 0 else luminance
                 high[slot] = max(high[slot], luminance)
             red += r
             green += g
             blue += b
             square += luminance * luminance
+            seen = min(luminance, white)
+            bright += seen
+            bright_square += seen * seen
         total[slot, 0], total[slot, 1], total[slot, 2] = red, green, blue
-        squares[slot] = square
+        shown[slot], shown_squares[slot] = bright, bright_square
+        if decided:
+            squares[slot] = square
         count[slot] = until[index]
     return rejected

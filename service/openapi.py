@@ -37,7 +37,12 @@ PICTURE_REPLY: Replies = {
         "content": {media_type: {} for media_type in CONTENT_TYPE.values()},
         "headers": {
             "Gazetrace-Frame": {
-                "description": "JSON: what the frame shows, the effects that ran, cells, rays, error and times",
+                "description": "JSON: what the frame shows, the effects that ran, cells, rays and times. "
+                "`error`: the standard error of its cells' means by their own samples, as shares of white, root mean "
+                "square over the screen (`rms`) and within 2.5 deg of the gaze (`foveal_rms`); what is lost since "
+                "cells are wider than pixels is not in it. `guessed`: share of the screen whose cells hold one "
+                "sample, which are judged by their neighbours. `deadline_met`, `error_met`: whether what "
+                "was wished for came true",
                 "schema": {"type": "string"},
             },
             "Server-Timing": {"description": "time of each stage [ms]", "schema": {"type": "string"}},

@@ -150,7 +150,7 @@ def steps_done(step: Step, cost: FrameCost, index: int, steps: int) -> int:
     """How many of a look's steps need not be taken any more after number `index`."""
     if cost.acuity_scale > step.request.quality.acuity.scale:
         return index + 1
-    if cost.mean_samples >= step.request.quality.samples_per_cell:
+    if cost.error_met or cost.mean_samples >= step.request.quality.samples_per_cell:
         return steps
     return max(index + 1, 2)
 

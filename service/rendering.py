@@ -322,10 +322,12 @@ def spent(request: FrameRequest, cost: FrameCost) -> dict[str, object]:
         "acuity_scale": cost.acuity_scale,
         "deadline_ms": cost.deadline_ms,
         "deadline_met": cost.deadline_met,
+        "max_error": cost.max_error,
+        "error_met": cost.error_met,
         "cells_traced": cost.cells_traced,
         "cells_reused": cost.cells_reused,
         "rays": asdict(cost.rays),
         "effects": list(cost.effects),
         "effect_reasons": dict(zip(cost.effects, cost.effect_reasons, strict=True)),
-        "error": {"rms": cost.rms_error, "foveal_rms": cost.foveal_rms_error},
+        "error": {"rms": cost.rms_error, "foveal_rms": cost.foveal_rms_error, "guessed": round(cost.guessed_error, 4)},
     }

@@ -7,9 +7,9 @@ renderer does. Bodies are read strictly (no number in quotes); query parameters 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from renderer.acuity import MAX_MARGIN_DEG, MAX_SCALE, Acuity
 from renderer.camera import MAX_POSITION_M, Camera
@@ -17,7 +17,15 @@ from renderer.display import MAX_LENGTH_CM, MAX_SIDE_PX, Display
 from renderer.effect_choice import EFFECTS, read_effect_choice
 from renderer.frame import FrameRequest
 from renderer.gaze import MAX_GAZE_PX, Gaze
-from renderer.quality import MAX_BUCKET_PX, MAX_DEADLINE_MS, MAX_DEPTH, MAX_SAMPLES, Quality
+from renderer.quality import (
+    ERROR_SAMPLES,
+    MAX_BUCKET_PX,
+    MAX_DEADLINE_MS,
+    MAX_DEPTH,
+    MAX_ERROR,
+    MAX_SAMPLES,
+    Quality,
+)
 from service.rendering import Order
 
 DISPLAY = Display()
@@ -64,6 +72,15 @@ DeadlineMs = Annotated[
         gt=0,
         le=MAX_DEADLINE_MS,
         description="time for the frame without encoding [ms]: fewer samples and, if need be, coarser cells",
+    ),
+]
+MaxError = Annotated[
+    float,
+    Field(
+        gt=0,
+        le=MAX_ERROR,
+        description="standard error, a share of white, that the frame may state over the screen and in the fovea: no "
+        f"more samples than it takes, of samples_per_cell at most ({ERROR_SAMPLES} where that is not stated)",
     ),
 ]
 AcuityModel = Annotated[
@@ -149,6 +166,16 @@ class AcuityBody(_Body):
         return Acuity(**self.model_dump())
 
 
+_Asking = TypeVar("_Asking", bound="QualityBody | FrameQuery")
+
+
+def _with_enough_samples(asking: _Asking) -> _Asking:
+    """What asks for an error and not for a number of samples may have as many as that usually takes."""
+    if asking.max_error is not None and "samples_per_cell" not in asking.model_fields_set:
+        asking.samples_per_cell = ERROR_SAMPLES
+    return asking
+
+
 class QualityBody(_Body):
     """What the frame may cost."""
 
@@ -162,6 +189,11 @@ class QualityBody(_Body):
     acuity: AcuityBody = AcuityBody()
     reconstruction: Reconstruction = "nearest"
     deadline_ms: DeadlineMs | None = None
+    max_error: MaxError | None = None
+
+    @model_validator(mode="after")
+    def _enough_samples(self) -> Self:
+        return _with_enough_samples(self)
 
     def record(self) -> Quality:
         """The renderer's record."""
@@ -295,8 +327,13 @@ class FrameQuery(CellQuery):
     effects: Annotated[str, Field(max_length=200, description=f"{FORCED}, with commas between")] = ""
     reconstruction: Reconstruction = "nearest"
     deadline_ms: DeadlineMs | None = None
+    max_error: MaxError | None = None
     format: Format = "png"
     image_quality: ImageQuality = IMAGE_QUALITY
+
+    @model_validator(mode="after")
+    def _enough_samples(self) -> Self:
+        return _with_enough_samples(self)
 
     def quality(self) -> Quality:
         """The renderer's record."""
@@ -308,6 +345,7 @@ class FrameQuery(CellQuery):
             effects=read_effect_choice(self.effects),
             reconstruction=self.reconstruction,
             deadline_ms=self.deadline_ms,
+            max_error=self.max_error,
         )
 
     def order(self, scene_id: str) -> Order:

@@ -15,7 +15,7 @@ from renderer.effect_choice import EFFECTS, read_effect_choice
 from renderer.errors import SettingsError
 from renderer.frame import FrameRequest
 from renderer.gaze import Gaze
-from renderer.quality import ANTIALIASING, MAPS, RECONSTRUCTIONS, Quality
+from renderer.quality import ANTIALIASING, ERROR_SAMPLES, MAPS, RECONSTRUCTIONS, Quality
 
 FLAG_OF_FIELD = {
     "gaze": "--gaze",
@@ -37,6 +37,7 @@ FLAG_OF_FIELD = {
     "quality.effects": "--effects",
     "quality.reconstruction": "--reconstruction",
     "quality.deadline_ms": "--deadline-ms",
+    "quality.max_error": "--max-error",
     "quality.acuity.model": "--acuity-model",
     "quality.acuity.eccentricity": "--eccentricity",
     "quality.acuity.scale": "--acuity-scale",
@@ -119,13 +120,19 @@ def _add_quality_flags(detail: argparse._ArgumentGroup, samples: int) -> None:
         "--full", action="store_const", const="full", dest="map", help="one cell a pixel: the reference, as --map full"
     )
     numbers: tuple[tuple[str, type, int | float, str, str], ...] = (
-        ("--samples", int, samples, "N", "camera rays a cell"),
         ("--shadow-samples", int, default.shadow_samples, "N", "shadow rays a cell sends to each light with a size"),
         ("--max-depth", int, default.max_depth, "N", "mirrors and glass boundaries a ray may meet"),
         ("--bucket", int, default.gaze_bucket_px, "PX", "side of the squares of gaze that share a map; 0: none"),
         ("--margin-deg", float, default.acuity.margin_deg, "DEG", "error of the eye tracker to allow for"),
         ("--acuity-scale", float, default.acuity.scale, "F", "2: cells twice as wide as the eye calls for"),
     )
+    detail.add_argument(
+        "--samples",
+        type=int,
+        metavar="N",
+        help=f"camera rays a cell (default {samples}, or {ERROR_SAMPLES} with --max-error)",
+    )
+    detail.set_defaults(default_samples=samples)
     for flag, kind, value, metavar, text in numbers:
         detail.add_argument(flag, type=kind, default=value, metavar=metavar, help=f"{text} (default {value:g})")
     detail.add_argument(
@@ -133,6 +140,13 @@ def _add_quality_flags(detail: argparse._ArgumentGroup, samples: int) -> None:
         type=float,
         metavar="MS",
         help="time for the frame without encoding: fewer samples and, if need be, coarser cells (default: none)",
+    )
+    detail.add_argument(
+        "--max-error",
+        type=float,
+        metavar="E",
+        help="no more samples than it takes for the frame's own standard error, a share of white, to be at most E over "
+        "the screen and in the fovea; of --samples at most (default: none)",
     )
     choices = (
         ("--antialiasing", default.antialiasing, "KIND", "where a cell's samples go", ANTIALIASING),
@@ -201,7 +215,7 @@ def quality_of(arguments: argparse.Namespace) -> Quality:
     return Quality(
         map=arguments.map,
         gaze_bucket_px=arguments.bucket,
-        samples_per_cell=arguments.samples,
+        samples_per_cell=_samples_of(arguments),
         antialiasing=arguments.antialiasing,
         shadow_samples=arguments.shadow_samples,
         max_depth=arguments.max_depth,
@@ -209,7 +223,14 @@ def quality_of(arguments: argparse.Namespace) -> Quality:
         acuity=acuity,
         reconstruction=arguments.reconstruction,
         deadline_ms=arguments.deadline_ms,
+        max_error=arguments.max_error,
     )
+
+
+def _samples_of(arguments: argparse.Namespace) -> int:
+    if arguments.samples is not None:
+        return int(arguments.samples)
+    return ERROR_SAMPLES if arguments.max_error is not None else int(arguments.default_samples)
 
 
 def camera_changes(arguments: argparse.Namespace) -> dict[str, Any]:

@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 
 FORMAT_OF_SUFFIX = {".png": "png", ".jpg": "jpeg", ".jpeg": "jpeg", ".webp": "webp", ".raw": "raw"}
 MOST_THREADS = 1024
+GUESSED = 0.5
+"""Share of the screen with one sample a cell from which a frame's error is called guessed."""
+
 OVERLAYS = ("cells", "rays", "roi", "gaze")
 
 DESCRIPTION = """\
@@ -217,6 +220,8 @@ def cost_record(frame: Frame, request: FrameRequest, extra_ms: dict[str, float])
         "acuity_scale": cost.acuity_scale,
         "deadline_ms": cost.deadline_ms,
         "deadline_met": cost.deadline_met,
+        "max_error": cost.max_error,
+        "error_met": cost.error_met,
         "cells_traced": cost.cells_traced,
         "cells_reused": cost.cells_reused,
         "rays": {
@@ -227,7 +232,7 @@ def cost_record(frame: Frame, request: FrameRequest, extra_ms: dict[str, float])
         },
         "effects": list(cost.effects),
         "effect_reasons": dict(zip(cost.effects, cost.effect_reasons, strict=True)),
-        "error": {"rms": cost.rms_error, "foveal_rms": cost.foveal_rms_error},
+        "error": {"rms": cost.rms_error, "foveal_rms": cost.foveal_rms_error, "guessed": round(cost.guessed_error, 4)},
         "rejected_samples": cost.rejected_samples,
         "timing_ms": {stage: round(ms, 3) for stage, ms in times.items()},
     }
@@ -251,10 +256,15 @@ def cost_text(record: dict[str, Any]) -> str:
         met = "met" if record["deadline_met"] else "missed"
         lines.append(("deadline", f" of {record['deadline_ms']:g} ms {met} with {record['samples_per_cell']} samples "
                                   f"a cell and an acuity scale of {record['acuity_scale']:g}"))  # fmt: skip
-    rms, foveal = record["error"]["rms"], record["error"]["foveal_rms"]
-    if rms is not None:
-        near = "" if foveal is None else f", {foveal:.5f} within 2.5 deg of the gaze"
-        lines.append(("error", f"{rms:.5f} rms over the screen{near} (estimated, linear)"))
+    if record["max_error"] is not None:
+        met = "met" if record["error_met"] else "not met"
+        lines.append(
+            ("wish", f"an error of {record['max_error']:g} {met} with {record['samples_per_cell']} samples a cell")
+        )
+    foveal = record["error"]["foveal_rms"]
+    near = "" if foveal is None else f", {foveal:.5f} within 2.5 deg of the gaze"
+    known = "estimated" if record["error"]["guessed"] < GUESSED else "guessed from neighbours"
+    lines.append(("error", f"{record['error']['rms']:.5f} rms over the screen{near} ({known}, linear, 1 is white)"))
     if record["rejected_samples"]:
         lines.append(("warning", f"{record['rejected_samples']:,} samples were not finite and count as black"))
     return "\n".join(f"{name:<8}{text}" for name, text in lines)

@@ -9,9 +9,10 @@ const NAMES = {
     "watson": "Watson", "stelacsf": "stelaCSF" },
 };
 const SAMPLES = [1, 2, 4, 8, 16, 32, 64, 128, 256];
+const ERRORS = [0.1, 0.05, 0.02, 0.01, 0.005];
 const DEADLINES_MS = [16, 33, 50, 70, 100, 200, 500];
 const DEFAULTS = {
-  samples_per_cell: "16", deadline_ms: "", antialiasing: "stochastic", map: "aligned", reconstruction: "nearest",
+  samples_per_cell: "16", deadline_ms: "", max_error: "", antialiasing: "stochastic", map: "aligned", reconstruction: "nearest",
   model: "peli", scale: "0", margin_deg: "0", shadow_samples: "4", max_depth: "5", format: "jpeg", image_quality: "90",
 };
 /** Fields of a request, by the control that sets them, where the names differ. */
@@ -51,6 +52,8 @@ export class Settings {
     this.#field("samples_per_cell").replaceChildren(...samples);
     const deadlines = DEADLINES_MS.map((time) => new Option(`${time} ms`, time));
     this.#field("deadline_ms").replaceChildren(new Option("default", ""), ...deadlines);
+    const errors = ERRORS.map((error) => new Option(`${100 * error} % of white`, error));
+    this.#field("max_error").replaceChildren(new Option("none", ""), ...errors);
     this.#field("shadow_samples").max = quality.shadow_samples.maximum;
     this.#field("max_depth").max = quality.max_depth.maximum;
     this.#field("margin_deg").max = acuity.margin_deg.maximum;
@@ -59,8 +62,8 @@ export class Settings {
 
   /** `quality` of a render request. */
   get quality() {
-    const { samples_per_cell, deadline_ms, antialiasing, map, reconstruction, model, margin_deg, shadow_samples,
-      max_depth } = this.#values();
+    const { samples_per_cell, deadline_ms, max_error, antialiasing, map, reconstruction, model, margin_deg,
+      shadow_samples, max_depth } = this.#values();
     return {
       map,
       samples_per_cell: Number(samples_per_cell),
@@ -71,6 +74,7 @@ export class Settings {
       acuity: { model, scale: this.#scale(), margin_deg: Number(margin_deg) },
       reconstruction,
       ...(deadline_ms && { deadline_ms: Number(deadline_ms) }),
+      ...(max_error && { max_error: Number(max_error) }),
     };
   }
 

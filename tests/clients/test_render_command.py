@@ -19,6 +19,10 @@ from renderer.codec import decode_texture
 from tests.clients.commands import PATIENCE_S, SMALL, start
 from tests.renderer.model_files import chunk, three_ds, three_ds_cube, three_ds_object
 
+HURRIED_SCALE = 48.0
+"""What is chosen for no time at all, by the rates that are assumed before any is learned: the first scale by which
+tracing takes half as long as the rest of the frame."""
+
 pytestmark = pytest.mark.usefixtures("plain_environment")
 
 CUBE = """\
@@ -86,7 +90,10 @@ def test_each_flag_reaches_the_frame(capsys: pytest.CaptureFixture[str], tmp_pat
     assert cost("--map", "scanline")["map"]["kind"] == "scanline"
     assert cost("--samples", "2")["samples_per_cell"] == 2
     hurried = cost("--samples", "9", "--deadline-ms", "0.001")
-    assert (hurried["deadline_met"], hurried["samples_per_cell"]) == (False, 1)
+    assert (hurried["deadline_met"], hurried["samples_per_cell"], hurried["acuity_scale"]) == (False, 1, HURRIED_SCALE)
+    wished = cost("--samples", "9", "--max-error", "0.5")
+    assert (wished["max_error"], wished["error_met"], wished["samples_per_cell"]) == (0.5, True, 2)
+    assert (plain["max_error"], plain["error_met"]) == (None, None)
     assert (plain["deadline_ms"], plain["deadline_met"]) == (None, None)
     assert cost("--max-depth", "0")["rays"]["reflection"] == 0 < plain["rays"]["reflection"]
     assert cost("--effects=+textures,-reflection")["rays"]["reflection"] == 0

@@ -147,7 +147,7 @@ def test_costs_add_up(scene: PreparedScene, tiling: str, samples: int) -> None:
         assert cost.rays.total == sum(dataclasses.astuple(cost.rays))
         assert cost.rejected_samples == 0
         assert cost.effects == ("textures", "shadows", "reflection", "refraction")
-        assert (cost.rms_error is None) == (samples == 1)
+        assert cost.guessed_error == (samples == 1)
         assert min(dataclasses.astuple(cost.time_ms)) >= 0
         if tiling == "full":
             assert cost.cells == SCREEN.pixels

@@ -36,7 +36,7 @@ def random_cells(seed: int, width: int, height: int) -> tuple[CellMap, NDArray[n
     total = (10 ** rng.uniform(-4, 1, (2 * cells, 3)) * count[:, None]).astype(np.float32)
     total[rng.random(2 * cells) < 0.1] = 0.0
     cell_map = CellMap("aligned", GazeBucket(0, 0, 0), zeros, zeros.copy(), zeros + 1, mask)
-    return cell_map, slots, Samples(total, np.zeros(2 * cells, np.float32), count)
+    return cell_map, slots, Samples(total, np.zeros(2 * cells, np.float32), np.zeros(2 * cells, np.float32), count)
 
 
 @given(st.integers(0, 2**32), st.integers(1, 40), st.integers(1, 150))

@@ -82,6 +82,9 @@ def test_a_coarse_first_frame_is_followed_by_a_fine_one_and_no_step_is_taken_in_
     assert steps_done(first, cost(7.9), 0, steps) == 2
     assert steps_done(first, cost(8.0), 0, steps) == steps
     assert steps_done(first, cost(8.0, scale=2.0), 0, steps) == 1
+    assert steps_done(first, replace(cost(2.0), error_met=True), 0, steps) == steps
+    assert steps_done(first, replace(cost(2.0, scale=2.0), error_met=True), 0, steps) == 1
+    assert steps_done(first, replace(cost(2.0), error_met=False), 0, steps) == 2
     assert steps_done(step_of(shown, look, eye, 3, 0.0), cost(4.0), 3, steps) == 4
 
 

@@ -15,7 +15,7 @@ from renderer.codec import FORMATS
 from renderer.display import Display
 from renderer.errors import SettingsError
 from renderer.gaze import Gaze
-from renderer.quality import ANTIALIASING, MAPS, RECONSTRUCTIONS, Quality
+from renderer.quality import ANTIALIASING, ERROR_SAMPLES, MAPS, RECONSTRUCTIONS, Quality
 from service.request import (
     AcuityBody,
     CameraBody,
@@ -41,6 +41,7 @@ DESIGN_EXAMPLE = {
         "acuity": {"model": "peli", "eccentricity": "exact", "scale": 1.0, "margin_deg": 0},
         "reconstruction": "nearest",
         "deadline_ms": None,
+        "max_error": None,
     },
     "format": "png",
 }
@@ -116,6 +117,7 @@ NUMBERS = [
     (QualityBody, Quality, "shadow_samples", int),
     (QualityBody, Quality, "max_depth", int),
     (QualityBody, Quality, "deadline_ms", float),
+    (QualityBody, Quality, "max_error", float),
     (CameraBody, Camera, "vertical_fov_deg", float),
 ]
 
@@ -164,6 +166,8 @@ def test_bounds_are_the_records(body: type[BaseModel], record: type, field: str,
         ("camera.roll_deg", 1),
         ("quality.map", "round"),
         ("quality.deadline_ms", "20"),
+        ("quality.max_error", 0),
+        ("quality.max_error", "0.1"),
         ("quality.acuity.model", "barten"),
         ("quality.acuity.blur", 1),
         ("format", "gif"),
@@ -223,6 +227,7 @@ def test_a_body_and_a_query_say_the_same() -> None:
                 "shadow_samples": 16,
                 "max_depth": 3,
                 "deadline_ms": 12.5,
+                "max_error": 0.25,
                 "effects": ["+textures", "-reflection"],
                 "acuity": {"model": "guenter", "eccentricity": "paper", "scale": 1.5, "margin_deg": 0.5},
             },
@@ -246,6 +251,7 @@ def test_a_body_and_a_query_say_the_same() -> None:
             "shadow_samples": "16",
             "max_depth": "3",
             "deadline_ms": "12.5",
+            "max_error": "0.25",
             "effects": " textures,-reflection",
             "acuity_model": "guenter",
             "eccentricity": "paper",
@@ -272,3 +278,14 @@ def _plain(value: object) -> object:
     if isinstance(value, Acuity):
         return {field.name: getattr(value, field.name) for field in fields(value)}
     return list(value) if isinstance(value, tuple) else value
+
+
+def test_who_asks_for_an_error_and_not_for_samples_may_have_many() -> None:
+    assert QualityBody().record().samples_per_cell == 4
+    assert QualityBody(max_error=0.1).record().samples_per_cell == ERROR_SAMPLES
+    assert QualityBody(max_error=0.1, samples_per_cell=4).record().samples_per_cell == 4
+    query = {"gaze_x": 1, "gaze_y": 2, "max_error": 0.1}
+    assert FrameQuery.model_validate(query).quality().samples_per_cell == ERROR_SAMPLES
+    assert FrameQuery.model_validate({**query, "samples_per_cell": 8}).quality().samples_per_cell == 8
+    again = QualityBody.model_validate({**QualityBody(max_error=0.1).model_dump(), "max_error": 0.2})
+    assert again.record().samples_per_cell == ERROR_SAMPLES
