@@ -107,8 +107,8 @@ def choose_acuity(works: Iterable[Work], pixels: int, rates: Rates, left_ns: flo
     chosen: Work | None = None
     for work in works:
         chosen = work
-        around = (rates.frame_pixel + (rates.map_pixel if work.new_map else 0.0)) * pixels
-        tracing = rates.sample * samples_lacking(work.held, 1)
+        around = rates.margin * (rates.frame_pixel + (rates.map_pixel if work.new_map else 0.0)) * pixels
+        tracing = rates.margin * rates.sample * samples_lacking(work.held, 1)
         if around + tracing <= left_ns or (around > left_ns and tracing <= LATE_SHARE * around):
             break
     assert chosen is not None
@@ -125,7 +125,7 @@ def choose_samples(held: NDArray[np.float64], most: int, pixels: int, rates: Rat
         rates: time for each part.
         left_ns: time until the deadline, the map being there [ns].
     """
-    budget = left_ns - rates.frame_pixel * pixels
+    budget = left_ns / rates.margin - rates.frame_pixel * pixels
     low, high = 1, most
     while low < high:
         middle = (low + high + 1) // 2

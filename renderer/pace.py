@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from collections import OrderedDict
 from collections.abc import Hashable
@@ -14,11 +15,16 @@ from renderer.whitted import shadow_rays_each
 GAIN = 1 / 4
 """Weight of a new measurement in the mean and the mean deviation: both follow within some frames."""
 
-FIRST_DEVIATION = 1 / 4
-"""Mean deviation, over the mean, that is assumed when there is only one measurement."""
+LATE_SHARE = 0.03
+"""Share of the frames that may take longer than was planned."""
 
-CAUTION = 2.0
-"""Mean deviations that are added to a mean when time is planned (Jacobson 1988 adds 2, later 4, for timeouts)."""
+MARGIN_STEP = 0.2
+"""Step of the margin's logarithm: a frame that took too long raises it by a fifth, thirty that did not lower it so."""
+
+FIRST_MARGIN = 1.25
+"""Margin before there are predictions to learn it from."""
+
+LARGEST_MARGIN = 4.0
 
 OUTLIER = 3.0
 """Factor from the mean beyond which a measurement is cut: one hiccup does not undo what many frames have shown."""
@@ -42,31 +48,37 @@ class Rate(NamedTuple):
 
     Attributes:
         mean: exponential mean of the measurements, or a guess [ns].
-        deviation: exponential mean of their distances from it [ns].
         measured: how many there were.
     """
 
     mean: float
-    deviation: float = 0.0
     measured: int = 0
 
-    @property
-    def cautious(self) -> float:
-        """A time that few units exceed [ns]."""
-        return self.mean + CAUTION * self.deviation
-
     def after(self, ns: float) -> Rate:
-        """The rate once a unit has taken `ns` (mean and deviation as in Jacobson 1988, section 2).
+        """The rate once a unit has taken `ns`.
 
         The first measurements replace the guess and are averaged evenly; none of them counts as an outlier.
         """
         if self.measured == 0:
-            return Rate(ns, ns * FIRST_DEVIATION, 1)
+            return Rate(ns, 1)
         gain = max(GAIN, 1 / (self.measured + 1))
         if self.measured * GAIN >= 1:
             ns = min(max(ns, self.mean / OUTLIER), self.mean * OUTLIER)
-        error = ns - self.mean
-        return Rate(self.mean + gain * error, self.deviation + gain * (abs(error) - self.deviation), self.measured + 1)
+        return Rate(self.mean + gain * (ns - self.mean), self.measured + 1)
+
+
+def margin_after(margin: float, ratio: float) -> float:
+    """The factor on predictions that all but `LATE_SHARE` of the frames stay within, learned from one more frame.
+
+    A quantile found by steps whose mean is nothing where the quantile is (Robbins and Monro 1951), which needs no
+    law of how predictions fail and follows as it changes.
+
+    Args:
+        margin: so far, 1 or more.
+        ratio: time that the frame took over the time that was predicted.
+    """
+    step = 1.0 - LATE_SHARE if ratio > margin else -LATE_SHARE
+    return min(max(margin * math.exp(MARGIN_STEP * step), 1.0), LARGEST_MARGIN)
 
 
 class Rates(NamedTuple):
@@ -76,11 +88,13 @@ class Rates(NamedTuple):
         map_pixel: a pixel of a screen whose map is new.
         frame_pixel: a pixel, for all but its map and its samples.
         sample: a camera sample.
+        margin: factor on all of them that few frames exceed.
     """
 
     map_pixel: float
     frame_pixel: float
     sample: float
+    margin: float = 1.0
 
 
 class Pace:
@@ -89,18 +103,18 @@ class Pace:
     def __init__(self, threads: int) -> None:
         self._threads = threads
         self._rates: OrderedDict[Hashable, Rate] = OrderedDict()
+        self._margins: OrderedDict[Hashable, float] = OrderedDict()
         self._lock = threading.Lock()
 
     def rates(self, prepared: PreparedScene, request: FrameRequest) -> Rates:
-        """Cautious rates for a frame."""
+        """Rates for a frame, and how far they can be trusted."""
         seeds = (MAP_SEED_NS, FRAME_SEED_NS, SAMPLE_SEED_NS)
+        keys = _keys(prepared, request)
         with self._lock:
-            return Rates(
-                *(
-                    self._rates.get(key, Rate(seed / self._threads)).cautious
-                    for key, seed in zip(_keys(prepared, request), seeds, strict=True)
-                )
+            map_pixel, frame_pixel, sample = (
+                self._rates.get(key, Rate(seed / self._threads)).mean for key, seed in zip(keys, seeds, strict=True)
             )
+            return Rates(map_pixel, frame_pixel, sample, self._margins.get(keys, FIRST_MARGIN))
 
     def learn(
         self, prepared: PreparedScene, request: FrameRequest, map_ns: float | None, frame_ns: float, trace_ns: float,
@@ -114,14 +128,25 @@ class Pace:
             frame_ns: time for all else but tracing.
             trace_ns, samples: time for tracing, and camera samples asked for.
         """
-        map_key, frame_key, sample_key = _keys(prepared, request)
+        keys = map_key, frame_key, sample_key = _keys(prepared, request)
         pixels = request.display.pixels
+        known = self.rates(prepared, request)
         with self._lock:
+            if all(key in self._rates for key in keys):
+                taken = frame_ns + trace_ns + (map_ns or 0.0)
+                around = known.frame_pixel + (known.map_pixel if map_ns is not None else 0.0)
+                self._trust(keys, taken / (around * pixels + known.sample * samples))
             self._note(frame_key, frame_ns / pixels)
             if map_ns is not None:
                 self._note(map_key, map_ns / pixels)
             if samples >= LEAST_SAMPLES:
                 self._note(sample_key, trace_ns / samples)
+
+    def _trust(self, keys: Hashable, ratio: float) -> None:
+        self._margins[keys] = margin_after(self._margins.get(keys, FIRST_MARGIN), ratio)
+        self._margins.move_to_end(keys)
+        while len(self._margins) > KEPT_RATES:
+            self._margins.popitem(last=False)
 
     def _note(self, key: Hashable, ns: float) -> None:
         self._rates[key] = self._rates.get(key, Rate(ns)).after(ns)

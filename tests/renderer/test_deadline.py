@@ -23,16 +23,16 @@ from tests.renderer.drawing import glass_and_mirror
 
 PIXELS = 1000
 counts = st.lists(st.integers(0, 500), min_size=2, max_size=12).map(lambda held: np.array(held, dtype=np.float64))
-rates = st.builds(Rates, st.floats(0, 50), st.floats(0, 50), st.floats(0.1, 500))
+rates = st.builds(Rates, st.floats(0, 50), st.floats(0, 50), st.floats(0.1, 500), st.floats(1, 4))
 budgets = st.floats(-1e5, 1e7)
 
 
 def predicted_ns(rates: Rates, work: Work, wanted: int) -> float:
-    """Time for a frame, cell by cell."""
+    """Time for a frame, cell by cell, with the margin."""
     time_ns = rates.frame_pixel * PIXELS + (rates.map_pixel * PIXELS if work.new_map else 0.0)
     for number, cells in enumerate(work.held):
         time_ns += rates.sample * cells * max(0, wanted - number)
-    return time_ns
+    return rates.margin * time_ns
 
 
 @given(counts, rates, budgets, st.data())
