@@ -130,12 +130,12 @@ class Pace:
         """
         keys = map_key, frame_key, sample_key = _keys(prepared, request)
         pixels = request.display.pixels
-        known = self.rates(prepared, request)
         with self._lock:
             if all(key in self._rates for key in keys):
                 taken = frame_ns + trace_ns + (map_ns or 0.0)
-                around = known.frame_pixel + (known.map_pixel if map_ns is not None else 0.0)
-                self._trust(keys, taken / (around * pixels + known.sample * samples))
+                map_pixel, frame_pixel, sample = (self._rates[key].mean for key in keys)
+                around = frame_pixel + (map_pixel if map_ns is not None else 0.0)
+                self._trust(keys, taken / (around * pixels + sample * samples))
             self._note(frame_key, frame_ns / pixels)
             if map_ns is not None:
                 self._note(map_key, map_ns / pixels)

@@ -40,6 +40,12 @@ async def render(body: RenderBody, _: Annotated[NoQuery, Query()], request: Requ
 
     The reply is the image. Its header `Gazetrace-Frame` says as JSON what the frame shows, which effects ran, what
     it cost and how accurate it is; `Server-Timing` has the time of each stage.
+
+    `error` of the header is the standard error of the cells' means by their own samples, as a share of white: `rms`
+    over the screen, `foveal_rms` within 2.5 deg of the gaze. What is lost since cells are wider than pixels is not in
+    it. It is a bound for regular samples and for lights with a size, and a guess in the share `guessed` of the
+    screen, where cells hold one sample. `deadline_met` and `error_met` say whether the wishes `deadline_ms` and
+    `max_error` of the quality came true; if not, the frame is the best there was.
     """
     received_ns = time.monotonic_ns()
     order = body.order()

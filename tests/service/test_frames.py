@@ -191,6 +191,21 @@ def test_a_frame_with_a_deadline_says_what_fitted_and_is_not_kept(
             assert header["acuity_scale"] == scale
 
 
+def test_a_frame_by_its_error_is_the_same_by_every_route_and_says_whether_it_came_true(client: httpx.Client) -> None:
+    path = "/v1/scenes/cornell/frame"
+    query = {name: value for name, value in QUERY.items() if name != "samples_per_cell"}
+    body = {"scene": "cornell", "gaze": {"x": 40, "y": 20}, "display": SMALL}
+    for wish, samples, met in (({"max_error": 0.9}, 2, True), ({"max_error": 1e-9, "samples_per_cell": 3}, 3, False)):
+        got = client.get(path, params={**query, **wish})
+        posted = client.post("/v1/render", json={**body, "quality": wish})
+        assert got.content == posted.content
+        assert "etag" in got.headers
+        for header in (header_of(got), header_of(posted)):
+            assert (header["max_error"], header["error_met"]) == (wish["max_error"], met)
+            assert header["samples_per_cell"] == samples
+            assert met == (max(header["error"]["rms"], header["error"]["foveal_rms"]) <= wish["max_error"])
+
+
 def test_a_gaze_in_another_unit_has_the_same_etag(client: httpx.Client) -> None:
     shares = {**QUERY, "gaze_x": 0.5, "gaze_y": 0.5, "unit": "fraction"}
     pixels = {**QUERY, "gaze_x": 48, "gaze_y": 27}

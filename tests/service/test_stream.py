@@ -84,6 +84,18 @@ def test_a_format_without_loss_needs_no_other_for_the_last_frame(address: str, i
         assert sessions(address)[headers[0].session]["frames"] == 2
 
 
+@pytest.mark.parametrize(("max_error", "met", "samples"), [(0.9, True, 2), (1e-9, False, 7)])
+def test_refinement_ends_as_soon_as_the_error_is_small_enough(
+    address: str, renderer: Renderer, max_error: float, met: bool, samples: int
+) -> None:
+    renderer.forget_samples()
+    with viewer(address) as eye:
+        eye.say(configure(quality={"max_error": max_error, "samples_per_cell": 7}))
+        header = eye.final().header
+        assert (header.cost["max_error"], header.cost["error_met"]) == (max_error, met)
+        assert header.samples == samples
+
+
 def test_the_newest_gaze_wins_and_the_others_are_counted(address: str) -> None:
     with viewer(address, "burst") as eye:
         eye.say(configure(quality=COARSE | {"samples_per_cell": 8}))
