@@ -107,26 +107,21 @@ def test_h23_a_smooth_mesh_has_no_black_triangles(renderer: Renderer, level: int
 
 @pytest.mark.parametrize("level", [1, 2, 3, 4])
 def test_h23_along_a_great_circle_the_shade_only_falls(renderer: Renderer, level: int) -> None:
-    """From the place that faces the lamp to the far side on three ways, 100 steps each: never up by more than 1/255."""
+    """From the place that faces the lamp to the far side on three ways, 100 steps each: the sphere's own shade, and
+    never up by more than 1/255.
+    """
     toward = np.array((1.0, 2.0, 3.0)) / math.sqrt(14)
     mesh = ball_mesh(WHITE_LAMBERT, level, smooth=True)
     prepared = prepare(Scene(meshes=(mesh,), lights=(light(*(1e6 * toward), 1e12 * math.pi),)))
-    for side in (
-        (0.3, -1.0, 0.2),
-        (1.0, 0.0, 0.1),
-        (-1.0, 0.4, 0.0),
-        (0.0, 0.9, -0.8),
-        (0.2, 0.7, 0.6),
-        (-0.5, 0.1, 1),
-    ):
+    angles = np.linspace(0.0, math.pi, 100)
+    for side in ((0.3, -1.0, 0.2), (1.0, 0.0, 0.1), (0.2, 0.7, 0.6)):
         beside = unit(np.cross(toward, side))
         shades = []
-        for angle in np.linspace(0.0, math.pi, 100):
+        for angle in angles:
             out = math.cos(angle) * toward + math.sin(angle) * beside
             camera = Camera(tuple(3 * out), (0, 0, 0), tuple(np.cross(out, np.cross(toward, beside))), 1.0)
             shades.append(pixel(renderer, prepared, camera=camera))
-        assert shades[0] == pytest.approx(1.0, abs=0.01)
-        assert shades[-1] == 0.0
+        np.testing.assert_allclose(shades, np.maximum(0.0, np.cos(angles)), atol=1 / 255)
         assert np.diff(shades).max() <= 1 / 255
 
 
