@@ -14,7 +14,7 @@ from starlette.middleware.cors import CORSMiddleware
 
 from renderer.library import SceneLibrary
 from renderer.pipeline import Renderer
-from service import cells, frames, pages, scenes, stream
+from service import accuracy, cells, frames, pages, scenes, stream
 from service.access import OwnNamesOnly, SmallBodiesOnly, TokenOnly
 from service.catalogue import Catalogue
 from service.desk import Desk
@@ -27,6 +27,7 @@ from service.rendering import Studio
 from service.sessions import Sessions
 from service.settings import Settings
 from service.stage import Stage
+from service.survey import Survey, Surveyor
 
 LOOKUP_THREADS = 4
 QUEUED_LOOKUPS = 64
@@ -40,6 +41,7 @@ def create_app(
     renderer: Renderer | None = None,
     announce: Callable[[str], None] = log.info,
     clock: Callable[[], int] = time.monotonic_ns,
+    survey: Survey | None = None,
 ) -> FastAPI:
     """The application.
 
@@ -48,6 +50,7 @@ def create_app(
         renderer: renders for this application and others; None for one of its own.
         announce: receives a line when the kernels begin to compile and one when frames can be rendered.
         clock: of the sessions, monotonic [ns].
+        survey: what is measured of a scene in idle time; None for the usual.
     """
 
     @asynccontextmanager
@@ -61,6 +64,7 @@ def create_app(
             JobQueue("gazetrace-render", settings.max_concurrent_renders, settings.max_queued_renders),
             JobQueue("gazetrace-lookup", LOOKUP_THREADS, QUEUED_LOOKUPS),
             Sessions(settings, Stage(studio, settings.max_concurrent_renders), clock),
+            Surveyor(studio, survey or Survey(), own.threads),
         )
         app.state.desk = desk
         desk.studio.warm_up(announce)
@@ -68,6 +72,7 @@ def create_app(
         yield
         desk.studio.close()
         desk.sessions.close()
+        await asyncio.to_thread(desk.surveyor.close)
         desk.renders.close()
         desk.lookups.close()
         if renderer is None:
@@ -82,7 +87,7 @@ def create_app(
         redirect_slashes=False,
     )
     answer_errors(app)
-    for part in (frames, cells, scenes, stream, pages):
+    for part in (frames, cells, scenes, accuracy, stream, pages):
         app.include_router(part.router)
     describe_api(app, settings)
     return app

@@ -12,6 +12,7 @@ from service.catalogue import Catalogue
 from service.jobs import JobQueue
 from service.rendering import Studio
 from service.sessions import Sessions
+from service.survey import Surveyor
 
 Result = TypeVar("Result")
 
@@ -26,6 +27,7 @@ class Desk:
         renders: queue of whole frames.
         lookups: queue of what is quick, so that it does not wait behind frames.
         sessions: of viewers and gaze sources.
+        surveyor: measures what accuracy costs.
     """
 
     studio: Studio
@@ -33,6 +35,7 @@ class Desk:
     renders: JobQueue
     lookups: JobQueue
     sessions: Sessions
+    surveyor: Surveyor
 
     async def render(self, request: Request, job: Callable[[], Result]) -> Result:
         """Run a job of the kind that takes a whole frame's time."""

@@ -21,6 +21,7 @@ from renderer.library import SceneLibrary
 from renderer.pipeline import Renderer
 from renderer.prepared import PreparedScene
 from renderer.quality import Quality
+from service.idle import Idle
 from service.metrics import Metrics
 from service.settings import Settings
 
@@ -106,12 +107,16 @@ class Studio:
         renderer: traces; belongs to the caller.
         library: scenes; belongs to the caller.
         metrics: counts frames.
+
+    Attributes:
+        idle: whoever has work for when nobody waits for a frame asks it.
     """
 
     def __init__(self, settings: Settings, renderer: Renderer, library: SceneLibrary, metrics: Metrics) -> None:
         self.settings = settings
         self.metrics = metrics
         self.library = library
+        self.idle = Idle()
         self._renderer = renderer
         self._frames = itertools.count(1)
         self._not_ready: str | None = "the kernels are not compiled yet"
@@ -192,7 +197,8 @@ class Studio:
 
     def cell_map(self, display: Display, quality: Quality, gaze: Gaze) -> tuple[CellMap, bool]:
         """The cells for a gaze, and whether they were known already."""
-        return self._renderer.cell_map(display, quality, gaze)
+        with self.idle.busy():
+            return self._renderer.cell_map(display, quality, gaze)
 
     def etag(self, order: Order) -> str:
         """A strong ETag of the picture: it changes whenever the bytes can.
@@ -256,8 +262,9 @@ class Studio:
             OverLimit: for more camera rays than one request may ask for.
         """
         started_ns = time.monotonic_ns()
-        known_map, map_ms = self._check_cells(request)
-        frame = self._renderer.render(prepared, request, abandon)
+        with self.idle.busy():
+            known_map, map_ms = self._check_cells(request)
+            frame = self._renderer.render(prepared, request, abandon)
         cost = replace(frame.cost, map_cached=frame.cost.map_cached and known_map)
         if cost.rejected_samples:
             log.warning("%s: %d samples were not finite and count as black", scene_id, cost.rejected_samples)

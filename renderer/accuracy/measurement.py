@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from renderer.accuracy.grid import Setting
 from renderer.accuracy.measures import plain_measures
 from renderer.accuracy.record import Accuracy, SettingResult, StandardError
+from renderer.accuracy.renders import Renders
 from renderer.accuracy.timing import frame_time
 from renderer.eccentricity import eccentricity_deg
 from renderer.frame import FrameRequest, RayCounts, StageTimes
-from renderer.pipeline import Renderer
 from renderer.prepared import PreparedScene
 from renderer.standard_error import FOVEA_DEG
 
@@ -32,7 +32,7 @@ class Measured:
 
 
 def measure(
-    renderer: Renderer,
+    renderer: Renders,
     prepared: PreparedScene,
     view: FrameRequest,
     setting: Setting,

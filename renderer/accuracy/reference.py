@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 
 from renderer.accuracy.measures import shown
 from renderer.accuracy.record import StandardError
+from renderer.accuracy.renders import Renders
 from renderer.eccentricity import eccentricity_deg
 from renderer.frame import FrameRequest
-from renderer.pipeline import Renderer
 from renderer.prepared import PreparedScene
 from renderer.quality import Quality
 from renderer.standard_error import FOVEA_DEG
@@ -56,7 +56,7 @@ def rounds(samples: int, spared: int) -> tuple[int, ...]:
 
 
 def render_reference(
-    renderer: Renderer,
+    renderer: Renders,
     prepared: PreparedScene,
     view: FrameRequest,
     samples: int,

@@ -14,8 +14,8 @@ from typing import Final
 
 from renderer.accuracy.grid import Setting
 from renderer.accuracy.record import FrameTime
+from renderer.accuracy.renders import Renders
 from renderer.frame import FrameRequest, StageTimes
-from renderer.pipeline import Renderer
 from renderer.prepared import PreparedScene
 
 SEED: Final = 2014
@@ -29,7 +29,7 @@ def turn(settings: Sequence[Setting], repeat: int) -> tuple[Setting, ...]:
     return tuple(order)
 
 
-def timed_frame(renderer: Renderer, prepared: PreparedScene, view: FrameRequest, setting: Setting) -> StageTimes:
+def timed_frame(renderer: Renders, prepared: PreparedScene, view: FrameRequest, setting: Setting) -> StageTimes:
     """What the stages of one frame took, as 8-bit pixels, not encoded.
 
     Args:

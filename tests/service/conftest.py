@@ -15,6 +15,7 @@ from renderer.pipeline import Renderer
 from service.app import create_app
 from service.server import Server, address_of, listen
 from service.settings import Settings
+from service.survey import Survey
 
 PATIENCE_S = 120
 """Longest wait for anything; kernels may have to be compiled first."""
@@ -29,6 +30,7 @@ def serving(
     *,
     ready: bool = True,
     clock: Callable[[], int] = time.monotonic_ns,
+    survey: Survey | None = None,
 ) -> Iterator[str]:
     """A service in a thread of this process: its address. `ready`: once it renders, else at once."""
     lines: list[str] = []
@@ -40,7 +42,7 @@ def serving(
             compiled.set()
 
     with listen(settings) as listener:
-        server = Server(create_app(settings, renderer, announce, clock), settings)
+        server = Server(create_app(settings, renderer, announce, clock, survey), settings)
         thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]})
         thread.start()
         try:
