@@ -75,6 +75,8 @@ def trimmed_shade(prepared: PreparedScene) -> Any:
         never.append("not spawn or material.calls & SPAWNS == 0")
     if not bits & reflectance.MICROFACETS:
         never.append("material.calls & MICROFACETS != 0")
+    if len(prepared.surfaces.indices) == 1:
+        never += ["len(indices) > 1", "material.medium > 0"]
     response = trimmed(reflectance.reflectance, never, {})
     to_eye = trimmed(lighting._light_to_eye, never, {"reflectance": response})
     from_points = trimmed(lighting.light_from_points, never, {"_light_to_eye": to_eye})
