@@ -1,8 +1,7 @@
 """What is measured of a scene: the records of accuracy.json, and reading them back.
 
-A value that does not exist is None, `null` in the file: foveal ones where the fovea is off the screen, a stated error
-where a cell has one sample only, a ratio to a black reference, the PSNR of two equal frames, and what a metric
-that is not installed would say.
+A value that does not exist is None, `null` in the file: foveal ones where the fovea is off the screen, a ratio to a
+black reference, the PSNR of two equal frames, and what a metric that is not installed would say.
 """
 
 from __future__ import annotations
