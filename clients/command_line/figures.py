@@ -6,6 +6,7 @@ import argparse
 import json
 import shlex
 import sys
+from collections.abc import Sequence
 from dataclasses import asdict, replace
 from datetime import UTC, datetime
 from importlib import metadata
@@ -13,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from clients.command_line.errors import OK, UsageError, blame_flag
-from clients.command_line.figures_record import differences, figures_text, rays_record, time_record
+from clients.command_line.figures_record import differences, figures_text, models_record, rays_record, time_record
 from clients.command_line.frame_flags import size
 from clients.command_line.progress import counting
 from clients.command_line.render import add_threads, check_threads, ready_renderer, write_whole
@@ -24,6 +25,7 @@ from renderer.gaze import Gaze
 from renderer.paper import published
 
 if TYPE_CHECKING:
+    from renderer.acuity_comparison import ModelCost
     from renderer.display import Display
     from renderer.paper.timing import TimeComparison
 
@@ -33,8 +35,9 @@ beside the paper's, with what differs named.
 
 Written to DIR: figures.html (everything on one page), figures.json, figures.txt, figure-1 (contrast sensitivity) and
 figure-2 (region of interest), figure-5 (cell maps), figure-7 (full and gaze-dependent pictures) as PNG, the curves
-as SVG too. The pictures are timed in turn: expect five minutes on two cores, half a minute with --quick. Figures
-and page want the extra 'report'; the tables are written without it."""
+as SVG too; beyond the paper, acuity-models (other models of acuity, and the rays that each costs). The pictures are
+timed in turn: expect five minutes on two cores, half a minute with --quick. Figures and page want the extra 'report';
+the tables are written without it."""
 
 EXAMPLES = """\
 examples:
@@ -99,6 +102,7 @@ def run(arguments: argparse.Namespace) -> int:
     renderer = ready_renderer(arguments.threads)
 
     from renderer.accuracy.machine import this_machine
+    from renderer.acuity_comparison import compare_models
     from renderer.paper.rays import CASES, count_all
     from renderer.paper.timing import QUALITIES, compare_times
     from renderer.workers import WorkerPool
@@ -106,6 +110,7 @@ def run(arguments: argparse.Namespace) -> int:
     pool = WorkerPool(renderer.threads)
     with counting("counting rays", len(CASES)) as tick:
         counts = count_all(pool, tick)
+    models = compare_models(display, gaze, replace(published.OUR_QUALITY, samples_per_cell=samples), pool)
     pool.close()
     with counting(f"rendering {arguments.scene}", repeats * len(QUALITIES)) as tick:
         times = compare_times(renderer, prepared, display, gaze, samples, repeats, tick)
@@ -119,13 +124,14 @@ def run(arguments: argparse.Namespace) -> int:
         "complete": samples >= published.SAMPLES_PER_CELL and repeats >= DEFAULT_REPEATS,
         "rays": rays_record(counts),
         "time": time_record(arguments.scene, times),
+        "models": models_record(models),
     }
     record["differences"] = differences(record)
     text = json.dumps(record, indent=2)
     write_whole(folder / "figures.json", text.encode() + b"\n")
     write_whole(folder / "figures.txt", figures_text(record).encode() + b"\n")
     if can_plot():
-        _draw_page(folder, record, times)
+        _draw_page(folder, record, times, models)
     print(text if arguments.json else figures_text(record))
     if not can_plot():
         print(f"gazetrace: note: figures and page are left out; they want {WANTED}", file=sys.stderr)
@@ -164,11 +170,11 @@ def _view(pixels: tuple[int, int], samples: int) -> tuple[Display, Gaze]:
     return display, Gaze(x, y)
 
 
-def _draw_page(folder: Path, record: dict[str, Any], times: TimeComparison) -> None:
+def _draw_page(folder: Path, record: dict[str, Any], times: TimeComparison, models: Sequence[ModelCost]) -> None:
     """Draw the figures and put everything on one page."""
-    from clients.command_line.figures_drawing import draw_figures
+    from clients.command_line.figures_drawing import FIGURES, draw_figures
     from clients.report.paper_page import paper_page
 
-    with counting("drawing", 4) as tick:
-        figures = draw_figures(folder, times, tick)
+    with counting("drawing", FIGURES) as tick:
+        figures = draw_figures(folder, times, models, tick)
     write_whole(folder / "figures.html", paper_page(record, figures).encode())

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from clients.command_line.figures_record import millions, place, size
 from clients.command_line.render import write_whole
+from clients.report.model_figure import ModelCurve, draw_models
 from clients.report.paper_figures import (
     Cells,
     Curves,
@@ -22,25 +23,50 @@ from clients.report.paper_figures import (
 from clients.report.paper_page import PaperFigure
 
 if TYPE_CHECKING:
+    from renderer.acuity_comparison import ModelCost
     from renderer.paper.timing import TimeComparison
 
 ENLARGED = 16
 """One part in so many of the screen's width is enlarged in figure 7."""
 
 
-def draw_figures(folder: Path, times: TimeComparison, tick: Callable[[], None]) -> list[PaperFigure]:
-    """Draw figures 1, 2, 5 and 7 into a folder.
+FIGURES = 5
+"""How many `draw_figures` draws."""
+
+
+def draw_figures(
+    folder: Path, times: TimeComparison, models: Sequence[ModelCost], tick: Callable[[], None]
+) -> list[PaperFigure]:
+    """Draw figures 1, 2, 5 and 7, and the acuity models, into a folder.
 
     Args:
         folder: where they go.
         times: the pictures of figure 7, whose screen and gaze the others show.
+        models: what each acuity model costs there.
         tick: called after each.
     """
     figures = []
     for draw in (_sensitivity, _region_of_interest, _cell_maps, _comparison):
         figures.append(draw(folder, times))
         tick()
+    figures.append(_models(folder, times, models))
+    tick()
     return figures
+
+
+def _models(folder: Path, times: TimeComparison, models: Sequence[ModelCost]) -> PaperFigure:
+    curves = [
+        ModelCurve(cost.model, cost.eccentricities_deg, cost.cut_offs_cpd, cost.cells_per_pixel, cost.camera_rays)
+        for cost in models
+    ]
+    files = draw_models(curves, _display_cpd(times), folder / "acuity-models")
+    return PaperFigure(
+        "Beyond the paper: other models of acuity",
+        files[0],
+        f"The paper takes Peli's model; these are in its place by one setting. On the right the cells of our default "
+        f"map at gaze {_place(times)}, and the camera rays of {times.samples_per_cell} a cell. What each gains in "
+        "accuracy is measured by gazetrace accuracy.",
+    )
 
 
 def _sensitivity(folder: Path, times: TimeComparison) -> PaperFigure:

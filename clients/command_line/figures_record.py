@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from renderer.paper import published
 
 if TYPE_CHECKING:
+    from renderer.acuity_comparison import ModelCost
     from renderer.paper.rays import RayCount
     from renderer.paper.timing import TimeComparison, TimedPicture
 
@@ -37,6 +38,21 @@ def rays_record(counts: Sequence[RayCount]) -> list[dict[str, Any]]:
             }
         )
     return lines
+
+
+def models_record(models: Sequence[ModelCost]) -> list[dict[str, Any]]:
+    """What each acuity model costs, without its curve."""
+    return [
+        {
+            "model": cost.model,
+            "source": cost.source,
+            "valid_deg": cost.valid_deg,
+            "cells": cost.cells,
+            "cells_per_pixel": cost.cells_per_pixel,
+            "camera_rays": cost.camera_rays,
+        }
+        for cost in models
+    ]
 
 
 def time_record(scene: str, times: TimeComparison) -> dict[str, Any]:

@@ -12,6 +12,7 @@ import pytest
 
 from clients.command_line import main
 from clients.command_line.figures_record import figures_text
+from renderer.acuity import MODELS
 from renderer.codec import decode_texture
 from tests.clients.commands import SMALL, failing
 from tests.service.chromium import Page
@@ -19,7 +20,15 @@ from tests.service.chromium import Page
 pytestmark = pytest.mark.usefixtures("plain_environment")
 
 QUICK = (*SMALL, "--samples", "2", "--repeats", "2", "--scene", "matte")
-PICTURES = ("figure-1.png", "figure-2.png", "figure-5.png", "figure-7.png", "full.png", "gaze-dependent.png")
+PICTURES = (
+    "figure-1.png",
+    "figure-2.png",
+    "figure-5.png",
+    "figure-7.png",
+    "full.png",
+    "gaze-dependent.png",
+    "acuity-models.png",
+)
 
 
 @pytest.fixture(scope="module")
@@ -33,13 +42,14 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_it_writes_every_figure_and_the_tables(made: Path) -> None:
     pytest.importorskip("matplotlib", reason="the extra 'report' is not installed")
     assert {path.name for path in made.iterdir()} == {
-        *PICTURES, "figure-1.svg", "figures.html", "figures.json", "figures.txt",
+        *PICTURES, "figure-1.svg", "acuity-models.svg", "figures.html", "figures.json", "figures.txt",
     }  # fmt: skip
     for name in PICTURES:
         pixels = decode_texture((made / name).read_bytes(), name).pixels
         assert pixels.std() > 5, f"{name} is blank"
     assert decode_texture((made / "full.png").read_bytes(), "full").pixels.shape == (54, 96, 3)
-    assert (made / "figure-1.svg").read_text().count("<svg") == 1
+    for name in ("figure-1.svg", "acuity-models.svg"):
+        assert (made / name).read_text().count("<svg") == 1
 
 
 def test_the_record_holds_the_papers_numbers_beside_ours(made: Path) -> None:
@@ -55,6 +65,11 @@ def test_the_record_holds_the_papers_numbers_beside_ours(made: Path) -> None:
         ratios = [a / b for a, b in zip(full["time_ms"]["repeats"], picture["time_ms"]["repeats"], strict=True)]
         assert picture["time_ratio"]["median"] == pytest.approx(np.median(ratios))
         assert picture["camera_ray_ratio"] == full["cells"] / picture["cells"]
+    models = {cost["model"]: cost for cost in record["models"]}
+    ours = next(picture for picture in reduced if picture["name"] == "our default")
+    assert list(models) == list(MODELS)
+    assert models["peli"]["cells"] == ours["cells"]
+    assert models["peli"]["camera_rays"] == ours["rays"]["primary"]
     assert record["machine"]["threads"] >= 1
     assert not record["complete"]
     assert any("2 rays a cell, the paper's of 32" in sentence for sentence in record["differences"])
@@ -69,7 +84,7 @@ def test_the_page_works_from_disk_and_fits_a_phone(made: Path, page: Page) -> No
     for width, height in ((1366, 768), (390, 844)):
         page.open((made / "figures.html").as_uri(), width, height)
         page.wait_for("document.readyState === 'complete'")
-        assert page.evaluate("[...document.images].map((image) => image.naturalWidth > 0)") == [True] * 4
+        assert page.evaluate("[...document.images].map((image) => image.naturalWidth > 0)") == [True] * 5
         assert page.evaluate("document.documentElement.scrollWidth") <= width
         assert page.complaints() == []
         asked = [event for event in page.events if event["method"] == "Network.requestWillBeSent"]

@@ -6,7 +6,7 @@ function showSetting(place, setting, reference, places) {
     row("whole", [
       picture(reference.pictures.frame, "reference", reference.file),
       picture(setting.pictures.frame, setting.label, setting.files.frame),
-      picture(setting.pictures.error, "error", setting.files.error),
+      picture(setting.pictures.error, "error: black below 0.001 of white, brightest at 1", setting.files.error),
     ]),
     row("parts", Object.entries(places).flatMap(([name, text]) => [
       picture(reference.pictures[name], `reference, ${text}`),
