@@ -99,7 +99,8 @@ function drawLabels(svg, points, x, y, width) {
     if (!setting.marks.length) continue;
     const name = setting.marks.map((mark) => (mark === "paper" ? "the paper's setting" : mark)).join(", ");
     const right = x(time) > width * 0.7;
-    const place = { x: x(time) + (right ? -13 : 13), y: y(loss) - 9, "text-anchor": right ? "end" : "start" };
+    const drop = setting.marks.includes("default") ? -9 : 20; // so that neighbours do not overlap
+    const place = { x: x(time) + (right ? -13 : 13), y: y(loss) + drop, "text-anchor": right ? "end" : "start" };
     svg.append(element("text", { class: `name ${setting.marks[0]}`, ...place }, name));
   }
 }
