@@ -38,7 +38,7 @@ class Camera:
 
     def __post_init__(self) -> None:
         for name in ("position", "look_at", "up"):
-            require_point(f"camera.{name}", getattr(self, name), MAX_POSITION_M)
+            object.__setattr__(self, name, require_point(f"camera.{name}", getattr(self, name), MAX_POSITION_M))
         require_number("camera.vertical_fov_deg", self.vertical_fov_deg, 1e-3, 179.0)
         forward = _direction(self.position, self.look_at)
         if forward is None:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.camera import MAX_POSITION_M, Camera
-from renderer.errors import SettingsError, require_number
+from renderer.errors import SettingsError, require_all, require_kind, require_number
 from renderer.fields import Fields
 
 MAX_TIME_S: Final = 1e6
@@ -39,6 +39,7 @@ class Keyframe:
 
     def __post_init__(self) -> None:
         require_number("camera_path.time_s", self.time_s, 0.0, MAX_TIME_S)
+        require_kind("camera_path.camera", self.camera, Camera)
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +56,7 @@ class CameraPath:
     keyframes: tuple[Keyframe, ...]
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "keyframes", require_all("camera_path", self.keyframes, Keyframe))
         if not self.keyframes:
             raise SettingsError("camera_path", "at least one keyframe", ())
         for index in range(1, len(self.keyframes)):

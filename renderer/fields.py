@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
-import reprlib
 from collections.abc import Iterator
 from typing import Final
 
-from renderer.errors import SceneError, SettingsError, require_choice, require_integer, require_number
+from renderer.errors import SceneError, SettingsError, require_choice, require_integer, require_number, short
 
 _REQUIRED: Final = object()
-_LONGEST: Final = 80
-_SHORT_REPR: Final = reprlib.Repr()
-_SHORT_REPR.maxlist = _SHORT_REPR.maxtuple = 16
-_SHORT_REPR.maxlevel = 3
-_SHORT_REPR.maxstring = _SHORT_REPR.maxlong = _LONGEST
 
 
 class Fields:
@@ -30,7 +24,7 @@ class Fields:
         self.file = file
         self.place = place
         if not isinstance(values, dict):
-            raise SceneError(f"{file}: {place or 'top level'}: expected a table of fields, found {_short(values)}")
+            raise SceneError(f"{file}: {place or 'top level'}: expected a table of fields, found {short(values)}")
         self._values: dict[str, object] = values
         self._asked: set[str] = set()
 
@@ -54,11 +48,11 @@ class Fields:
 
     def refuse(self, key: str, expected: str, found: object) -> SceneError:
         """The error for a field whose value is not as expected; raise it."""
-        return SceneError(f"{self.file}: {self.where(key)}: expected {expected}, found {_short(found)}")
+        return SceneError(f"{self.file}: {self.where(key)}: expected {expected}, found {short(found)}")
 
     def in_file(self, error: SettingsError) -> SceneError:
         """The error of a record made from this file's fields, naming the file; raise it."""
-        return SceneError(f"{self.file}: {error.field}: expected {error.expected}, found {_short(error.found)}")
+        return SceneError(f"{self.file}: {error.field}: expected {error.expected}, found {short(error.found)}")
 
     def number(
         self, key: str, low: float, high: float, default: float | object = _REQUIRED, *, open_low: bool = False
@@ -154,9 +148,3 @@ class Fields:
         if value is _REQUIRED:
             raise SceneError(f"{self.file}: {self.where(key)}: expected {expected}, found nothing")
         return value
-
-
-def _short(value: object) -> str:
-    """`value` for a message, on one line of bounded length, however long or deeply nested it is."""
-    text = _SHORT_REPR.repr(value)
-    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 3]}..."

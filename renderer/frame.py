@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from renderer.camera import Camera
 from renderer.display import Display
-from renderer.errors import require_integer
+from renderer.errors import require_flag, require_integer, require_kind
 from renderer.gaze import Gaze
 from renderer.quality import Quality
 
@@ -33,7 +33,7 @@ class FrameRequest:
             request to request and ends as the one that a fresh process would make at once.
 
     Raises:
-        SettingsError: naming the field, for a number of samples out of range.
+        SettingsError: naming the field, for something else in its place or a number of samples out of range.
     """
 
     gaze: Gaze
@@ -44,6 +44,12 @@ class FrameRequest:
     samples: int | None = None
 
     def __post_init__(self) -> None:
+        require_kind("gaze", self.gaze, Gaze)
+        require_kind("display", self.display, Display)
+        if self.camera is not None:
+            require_kind("camera", self.camera, Camera)
+        require_kind("quality", self.quality, Quality)
+        require_flag("linear", self.linear)
         if self.samples is not None:
             require_integer("samples", self.samples, 1, self.quality.samples_per_cell)
 
@@ -61,6 +67,25 @@ class RayCounts:
     def total(self) -> int:
         """All rays."""
         return self.primary + self.shadow + self.reflection + self.refraction
+
+
+@dataclass(frozen=True, slots=True)
+class RejectedSamples:
+    """Samples that are no light, by what they are instead: all 0 unless something is broken.
+
+    Attributes:
+        not_a_number, negative: in one of its colours; they count as black.
+        too_bright: infinite, or beyond what can be summed up; they count as that bright.
+    """
+
+    not_a_number: int = 0
+    negative: int = 0
+    too_bright: int = 0
+
+    @property
+    def total(self) -> int:
+        """All of them."""
+        return self.not_a_number + self.negative + self.too_bright
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,7 +121,7 @@ class FrameCost:
         rms_error, foveal_rms_error: estimated standard error of the linear frame, as a share of white, over the
             screen and within 2.5 deg of the gaze (None where no cell is there); see `standard_error`.
         guessed_error: share of the screen, 0 to 1, whose error is a guess, since its cells hold one sample.
-        rejected_samples: samples that were not finite and count as black; 0 unless something is broken.
+        rejected_samples: samples that were no light.
         time_ms: stages.
     """
 
@@ -120,7 +145,7 @@ class FrameCost:
     rms_error: float
     foveal_rms_error: float | None
     guessed_error: float
-    rejected_samples: int
+    rejected_samples: RejectedSamples
     time_ms: StageTimes
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from renderer.adaptive import UNSURE, Squares, Verdicts, neighbours_lacking
 from renderer.cellmap import CellMap
-from renderer.frame import RayCounts
+from renderer.frame import RayCounts, RejectedSamples
 from renderer.prepared import PreparedScene
 from renderer.quality import Quality
 from renderer.store import FIRST_ROUND, SampleStore, add_samples, missing_cells
@@ -36,7 +36,7 @@ class Growth(NamedTuple):
     samples: int
     asked: int
     rays: RayCounts
-    rejected: int
+    rejected: RejectedSamples
     held: int
     fewest: int
     trace_ns: int
@@ -54,7 +54,7 @@ class _Tracer:
         self._pool = pool
         self.samples = 0
         self.trace_ns = 0
-        self.rejected = 0
+        self.rejected = np.zeros(3, dtype=np.int64)
         self.rays = RayCounts()
 
     def trace(
@@ -65,7 +65,7 @@ class _Tracer:
         samples, spread, white = self._store.samples, self._store.spread, self._store.white
         starts = block_starts(until - first, block_rays(prepared, self._quality))
         counts = [RayCounts()] * (len(starts) - 1)
-        rejected = [0] * (len(starts) - 1)
+        rejected = np.zeros((len(starts) - 1, 3), dtype=np.int64)
 
         def trace_block(block: int) -> None:
             part = slice(starts[block], starts[block + 1])
@@ -79,7 +79,7 @@ class _Tracer:
         traced = int((until - first).sum())
         self.samples += traced
         self.rays = total_rays([self.rays, *counts])
-        self.rejected += sum(rejected)
+        self.rejected += rejected.sum(axis=0)
         return traced
 
 
@@ -117,8 +117,9 @@ def grow(
     else:
         cells, traced = len(chosen), tracer.trace(squares, chosen, first, np.full_like(first, wanted))
         least = wanted
+    rejected = RejectedSamples(*tracer.rejected.tolist())
     return Growth(
-        cells, tracer.samples, asked, tracer.rays, tracer.rejected, held + traced, max(fewest, least), tracer.trace_ns
+        cells, tracer.samples, asked, tracer.rays, rejected, held + traced, max(fewest, least), tracer.trace_ns
     )
 
 

@@ -27,7 +27,7 @@ from renderer.intersection import Intersector
 from renderer.light_reach import reaching_lights
 from renderer.material_table import GRAINED, material_table, readings_of, used_materials
 from renderer.media import distinct_spheres, indices_of, rank_media
-from renderer.scene import Material, Mesh, PointLight, Scene, Sphere
+from renderer.scene import Light, Material, Mesh, PointLight, Scene, Sphere
 from renderer.shared_face import join_faces, mixed_bits
 from renderer.sphere import SphereTree, build_sphere_tree
 from renderer.tangent import TANGENT, mesh_tangents
@@ -149,8 +149,10 @@ def prepare(scene: Scene) -> PreparedScene:
         ],
         row, center, scale,
     )  # fmt: skip
-    lights = reaching_lights(scene)
-    area_lights = [light for light in scene.lights if not isinstance(light, PointLight) and any(light.radiance)]
+    lights = sorted(reaching_lights(scene), key=_rank)
+    area_lights = [
+        light for light in sorted(scene.lights, key=_rank) if not isinstance(light, PointLight) and any(light.radiance)
+    ]
     surfaces = Surfaces(
         facets=facets,
         tangents=tangents,
@@ -175,6 +177,15 @@ def prepare(scene: Scene) -> PreparedScene:
                                     *(material.emission for material in materials),
                                     *(light.radiance for light in area_lights)))  # fmt: skip
     return PreparedScene(scene, plan, center, scale, brightest, surfaces, intersector, nbytes, sieve)
+
+
+def _rank(light: Light) -> tuple[object, ...]:
+    """Where a light stands among the others, whatever their order in the scene: sums and samples depend on it.
+
+    By colour before place, so that a scene may be turned.
+    """
+    colour = light.intensity if isinstance(light, PointLight) else light.radiance
+    return type(light).__name__, colour, dataclasses.astuple(light)
 
 
 def _sphere_tree(
@@ -315,7 +326,7 @@ def _fill_facets(mesh: Mesh, local: NDArray[np.float32], material: int, facets: 
         given = unit(np.asarray(mesh.normals, dtype=np.float64))[mesh.faces]
         corners[:, :, 3:6] = np.where((given == 0.0).all(axis=2, keepdims=True), own, given)
     if mesh.uvs is not None:
-        with np.errstate(over="ignore"):
+        with np.errstate(over="ignore", invalid="ignore"):
             corners[:, :, 6:8] = mesh.uvs[mesh.faces]
     facets[:, :MATERIAL_COLUMN] = corners.reshape(-1, MATERIAL_COLUMN)
     facets[:, MATERIAL_COLUMN] = material

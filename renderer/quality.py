@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from renderer.acuity import Acuity
 from renderer.effect_choice import EffectChoice, require_effect_choice
-from renderer.errors import require_choice, require_integer, require_number
+from renderer.errors import require_choice, require_integer, require_kind, require_number
 
 MAPS = ("aligned", "scanline", "full")
 ANTIALIASING = ("stochastic", "regular", "adaptive")
@@ -70,6 +70,7 @@ class Quality:
         require_choice("quality.antialiasing", self.antialiasing, ANTIALIASING)
         require_integer("quality.shadow_samples", self.shadow_samples, 1, MAX_SAMPLES)
         require_effect_choice("quality.effects", self.effects)
+        require_kind("quality.acuity", self.acuity, Acuity)
         require_integer("quality.max_depth", self.max_depth, 0, MAX_DEPTH)
         require_choice("quality.reconstruction", self.reconstruction, RECONSTRUCTIONS)
         if self.deadline_ms is not None:

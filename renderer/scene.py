@@ -7,13 +7,25 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from renderer.camera import Camera
 from renderer.camera_path import CameraPath
-from renderer.errors import SceneError, SettingsError, require_choice, require_integer, require_number, require_point
+from renderer.errors import (
+    SceneError,
+    require_all,
+    require_choice,
+    require_flag,
+    require_integer,
+    require_kind,
+    require_number,
+    require_point,
+    require_rgb,
+    short,
+)
 
 Rgb = tuple[float, float, float]
 
@@ -35,8 +47,10 @@ BASES = ("phong", "ashikhmin-shirley")
 MAX_PRIORITY = 1000
 
 MAX_RADIANCE = 1e12
-"""Largest radiance or intensity a scene may state; keeps every product finite in float32."""
+"""Largest radiance a scene may state; keeps every product finite in float32."""
 
+MAX_INTENSITY = 1e24
+"""Largest intensity of a point light [W/sr]: the largest radiance, a thousand kilometres away."""
 
 RIGHT_ANGLE = 1e-4
 """Largest cosine between the edges of a rectangle: what coordinates of five digits round to."""
@@ -73,13 +87,18 @@ class Texture:
         return self.pixels[:, :, 1] if self.alpha is None else self.alpha
 
     def __post_init__(self) -> None:
+        require_kind("texture.name", self.name, str)
         require_choice(f"{self.name}: wrap_u", self.wrap_u, WRAPS)
         require_choice(f"{self.name}: wrap_v", self.wrap_v, WRAPS)
+        require_kind(f"{self.name}: pixels", self.pixels, np.ndarray)
         if self.pixels.dtype != np.uint8 or self.pixels.ndim != 3 or self.pixels.shape[2] != 3 or self.pixels.size == 0:
             raise SceneError(
                 f"{self.name}: expected (height, width, 3) uint8 pixels, found {self.pixels.shape} {self.pixels.dtype}"
             )
-        if self.alpha is not None and (self.alpha.dtype != np.uint8 or self.alpha.shape != self.pixels.shape[:2]):
+        if self.alpha is None:
+            return
+        require_kind(f"{self.name}: alpha", self.alpha, np.ndarray)
+        if self.alpha.dtype != np.uint8 or self.alpha.shape != self.pixels.shape[:2]:
             raise SceneError(
                 f"{self.name}: expected alpha as {self.pixels.shape[:2]} uint8, "
                 f"found {self.alpha.shape} {self.alpha.dtype}"
@@ -147,6 +166,7 @@ class Material:
     priority: int | None = None
 
     def __post_init__(self) -> None:
+        require_kind("material.name", self.name, str)
         where = f"material {self.name!r}"
         require_choice(f"{where}.base", self.base, BASES)
         for label, value, high in (
@@ -156,7 +176,15 @@ class Material:
             ("reflection", self.reflection, 1.0),
             ("transmission", self.transmission, 1.0),
         ):
-            require_rgb(f"{where}.{label}", value, high)
+            object.__setattr__(self, label, require_rgb(f"{where}.{label}", value, high))
+        for label, picture in (
+            ("diffuse_texture", self.diffuse_texture),
+            ("specular_texture", self.specular_texture),
+            ("alpha_texture", self.alpha_texture),
+            ("normal_texture", self.normal_texture),
+        ):
+            if picture is not None:
+                require_kind(f"{where}.{label}", picture, Texture)
         for label, exponent in (
             ("shininess", self.shininess),
             ("exponent_u", self.exponent_u),
@@ -201,23 +229,19 @@ class Mesh:
     tangents: NDArray[np.float64] | None = None
 
     def __post_init__(self) -> None:
-        n = len(self.vertices)
-        _require_shape(self.name, "vertices", self.vertices, (n, 3))
-        _require_shape(self.name, "faces", self.faces, (len(self.faces), 3))
-        if self.faces.dtype.kind not in "iu":
-            raise SceneError(f"{self.name}: faces: expected integers, found {self.faces.dtype}")
-        if len(self.faces) and (self.faces.min() < 0 or self.faces.max() >= n):
-            bad = int(np.argmax((self.faces < 0).any(axis=1) | (self.faces >= n).any(axis=1)))
-            raise SceneError(
-                f"{self.name}: face {bad}: expected vertex indices from 0 to {n - 1}, found {self.faces[bad].tolist()}"
-            )
-        _require_bounded(self.name, "vertex", self.vertices)
-        if self.normals is not None:
-            _require_shape(self.name, "normals", self.normals, (n, 3))
-        if self.uvs is not None:
-            _require_shape(self.name, "uvs", self.uvs, (n, 2))
-        if self.tangents is not None:
-            _require_shape(self.name, "tangents", self.tangents, (n, 4))
+        require_kind("mesh.name", self.name, str)
+        require_kind(f"{self.name}: material", self.material, Material)
+        require_flag(f"{self.name}: casts_shadows", self.casts_shadows)
+        vertices = _numbers(self.name, "vertices", self.vertices, 3)
+        n = len(vertices)
+        _require_bounded(self.name, "vertex", vertices)
+        object.__setattr__(self, "vertices", vertices)
+        object.__setattr__(self, "faces", _indices(self.name, self.faces, n))
+        for label, values, columns in (
+            ("normals", self.normals, 3), ("uvs", self.uvs, 2), ("tangents", self.tangents, 4),
+        ):  # fmt: skip
+            if values is not None:
+                object.__setattr__(self, label, _numbers(self.name, label, values, columns, n))
 
 
 @dataclass(frozen=True, slots=True)
@@ -240,9 +264,10 @@ class Sphere:
     casts_shadows: bool = True
 
     def __post_init__(self) -> None:
-        for axis, value in zip("xyz", self.center, strict=True):
-            require_number(f"sphere.center.{axis}", value, -MAX_COORDINATE_M, MAX_COORDINATE_M)
+        object.__setattr__(self, "center", require_point("sphere.center", self.center, MAX_COORDINATE_M))
         require_number("sphere.radius", self.radius, 0.0, MAX_COORDINATE_M, open_low=True)
+        require_kind("sphere.material", self.material, Material)
+        require_flag("sphere.casts_shadows", self.casts_shadows)
 
 
 @dataclass(frozen=True, slots=True)
@@ -260,9 +285,9 @@ class PointLight:
     casts_shadows: bool = True
 
     def __post_init__(self) -> None:
-        for axis, value in zip("xyz", self.position, strict=True):
-            require_number(f"light.position.{axis}", value, -MAX_COORDINATE_M, MAX_COORDINATE_M)
-        require_rgb("light.intensity", self.intensity, 1e24)
+        object.__setattr__(self, "position", require_point("light.position", self.position, MAX_COORDINATE_M))
+        object.__setattr__(self, "intensity", require_rgb("light.intensity", self.intensity, MAX_INTENSITY))
+        require_flag("light.casts_shadows", self.casts_shadows)
 
 
 class RectangleError(SceneError):
@@ -302,10 +327,11 @@ class RectangleLight:
     casts_shadows: bool = True
 
     def __post_init__(self) -> None:
-        require_point("light.corner", self.corner, MAX_COORDINATE_M)
-        require_point("light.edge_u", self.edge_u, MAX_COORDINATE_M)
-        require_point("light.edge_v", self.edge_v, MAX_COORDINATE_M)
-        require_rgb("light.radiance", self.radiance, MAX_RADIANCE)
+        for name in ("corner", "edge_u", "edge_v"):
+            object.__setattr__(self, name, require_point(f"light.{name}", getattr(self, name), MAX_COORDINATE_M))
+        object.__setattr__(self, "radiance", require_rgb("light.radiance", self.radiance, MAX_RADIANCE))
+        require_flag("light.two_sided", self.two_sided)
+        require_flag("light.casts_shadows", self.casts_shadows)
         for name, edge in (("edge_u", self.edge_u), ("edge_v", self.edge_v)):
             if not math.hypot(*edge) > 0.0:
                 raise RectangleError(name, "an edge with a length", edge)
@@ -333,9 +359,10 @@ class SphereLight:
     casts_shadows: bool = True
 
     def __post_init__(self) -> None:
-        require_point("light.center", self.center, MAX_COORDINATE_M)
+        object.__setattr__(self, "center", require_point("light.center", self.center, MAX_COORDINATE_M))
         require_number("light.radius", self.radius, 0.0, MAX_COORDINATE_M, open_low=True)
-        require_rgb("light.radiance", self.radiance, MAX_RADIANCE)
+        object.__setattr__(self, "radiance", require_rgb("light.radiance", self.radiance, MAX_RADIANCE))
+        require_flag("light.casts_shadows", self.casts_shadows)
 
 
 AreaLight = RectangleLight | SphereLight
@@ -357,9 +384,9 @@ class Surroundings:
     ambient: Rgb = BLACK
 
     def __post_init__(self) -> None:
-        require_rgb("surroundings.zenith", self.zenith, MAX_RADIANCE)
-        require_rgb("surroundings.horizon", self.horizon, MAX_RADIANCE)
-        require_rgb("surroundings.ambient", self.ambient, MAX_RADIANCE)
+        for name in ("zenith", "horizon", "ambient"):
+            rgb = require_rgb(f"surroundings.{name}", getattr(self, name), MAX_RADIANCE)
+            object.__setattr__(self, name, rgb)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -385,7 +412,16 @@ class Scene:
     camera_path: CameraPath | None = None
 
     def __post_init__(self) -> None:
+        for name, kinds in (
+            ("meshes", (Mesh,)), ("spheres", (Sphere,)), ("lights", (PointLight, RectangleLight, SphereLight)),
+        ):  # fmt: skip
+            object.__setattr__(self, name, require_all(f"scene.{name}", getattr(self, name), *kinds))
+        require_kind("scene.surroundings", self.surroundings, Surroundings)
+        require_kind("scene.camera", self.camera, Camera)
         require_number("scene.exposure", self.exposure, 0.0, MAX_RADIANCE, open_low=True)
+        require_kind("scene.title", self.title, str)
+        if self.camera_path is not None:
+            require_kind("scene.camera_path", self.camera_path, CameraPath)
 
     @property
     def triangles(self) -> int:
@@ -393,21 +429,41 @@ class Scene:
         return sum(len(mesh.faces) for mesh in self.meshes)
 
 
-def require_rgb(field_name: str, value: Rgb, high: float) -> None:
-    """Check that `value` is three numbers from 0 to `high`.
+def _numbers(name: str, label: str, values: object, columns: int, rows: int | None = None) -> NDArray[np.float64]:
+    """`values` as a (rows, columns) float64 array; any number of rows if `rows` is None.
 
     Raises:
-        SettingsError: naming the field and the channel.
+        SceneError: naming the mesh, for anything but an array of real numbers of that shape.
     """
-    if len(value) != 3:
-        raise SettingsError(field_name, "three numbers: red, green, blue", value)
-    for channel, part in zip(("red", "green", "blue"), value, strict=True):
-        require_number(f"{field_name}.{channel}", part, 0.0, high)
+    array = _array(name, label, values, "fiu", "numbers", columns, rows)
+    with np.errstate(over="ignore", invalid="ignore"):
+        return array.astype(np.float64, copy=False)
 
 
-def _require_shape(name: str, label: str, array: NDArray[np.generic], shape: tuple[int, ...]) -> None:
-    if array.shape != shape:
-        raise SceneError(f"{name}: {label}: expected shape {shape}, found {array.shape}")
+def _indices(name: str, values: object, n: int) -> NDArray[np.int64]:
+    """`values` as an (m, 3) int64 array of vertex indices.
+
+    Raises:
+        SceneError: naming the mesh, and the first face with an index that is not from 0 to n - 1.
+    """
+    array = _array(name, "faces", values, "iu", "integers", 3, None)
+    if len(array) and (array.min() < 0 or array.max() >= n):
+        bad = int(np.argmax((array < 0).any(axis=1) | (array >= n).any(axis=1)))
+        raise SceneError(f"{name}: face {bad}: expected vertex indices from 0 to {n - 1}, found {array[bad].tolist()}")
+    return array.astype(np.int64, copy=False)
+
+
+def _array(
+    name: str, label: str, values: object, kinds: str, numbers: str, columns: int, rows: int | None
+) -> NDArray[Any]:
+    if not isinstance(values, np.ndarray):
+        raise SceneError(f"{name}: {label}: expected an array of {numbers}, found {short(values)}")
+    if values.dtype.kind not in kinds:
+        raise SceneError(f"{name}: {label}: expected {numbers}, found {values.dtype}")
+    shape = (len(values) if rows is None and values.ndim else rows, columns)
+    if values.shape != shape:
+        raise SceneError(f"{name}: {label}: expected shape {shape}, found {values.shape}")
+    return values
 
 
 def _require_bounded(name: str, label: str, points: NDArray[np.float64]) -> None:

@@ -293,7 +293,7 @@ def add_samples(
     cells: NDArray[np.int32],
     until: NDArray[np.int32],
     radiance: NDArray[np.float32],
-) -> int:
+) -> tuple[int, int, int]:
     """Add the radiance of the next samples of some cells, in the order of the samples.
 
     Args:
@@ -304,12 +304,13 @@ def add_samples(
         radiance: (samples, 3) float32, the samples of a cell after one another.
 
     Returns:
-        How many samples were not a number or negative, and count as black.
+        How many samples were not a number or else negative, and count as black; and how many others were brighter
+        than BRIGHTEST, and count as that.
     """
     total, shown, shown_squares, count = samples.total, samples.shown, samples.square, samples.number
     low, high, squares = spread.low, spread.high, spread.square
     decided = len(low) > 0
-    rejected = 0
+    not_a_number = negative = too_bright = 0
     row = 0
     for index in range(len(cells)):
         slot = slots[cells[index]]
@@ -320,9 +321,14 @@ def add_samples(
             r, g, b = radiance[row, 0], radiance[row, 1], radiance[row, 2]
             row += 1
             if not (r >= 0.0 and g >= 0.0 and b >= 0.0):
-                rejected += 1
+                if r == r and g == g and b == b:
+                    negative += 1
+                else:
+                    not_a_number += 1
                 r = g = b = np.float32(0.0)
-            r, g, b = min(r, BRIGHTEST), min(g, BRIGHTEST), min(b, BRIGHTEST)
+            elif max(r, max(g, b)) > BRIGHTEST:
+                too_bright += 1
+                r, g, b = min(r, BRIGHTEST), min(g, BRIGHTEST), min(b, BRIGHTEST)
             luminance = np.float32(LUMINANCE[0]) * r + np.float32(LUMINANCE[1]) * g + np.float32(LUMINANCE[2]) * b
             if sample < FIRST_ROUND and decided:
                 low[slot] = min(low[slot], luminance) if sample > 0 else luminance
@@ -339,4 +345,4 @@ def add_samples(
         if decided:
             squares[slot] = square
         count[slot] = until[index]
-    return rejected
+    return not_a_number, negative, too_bright

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import asdict, fields
 
 from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, generate_latest
 from prometheus_client.exposition import CONTENT_TYPE_LATEST
 
-from renderer.frame import FrameCost
+from renderer.frame import FrameCost, RejectedSamples
 
 MS_PER_S = 1000.0
 
@@ -27,7 +28,9 @@ class Metrics:
         self._cells = self._counter("cells", "Cells of the frames, traced or taken from the sample store.", "source")
         self._maps = self._counter("maps", "Cell maps of the frames, built or taken from the cache.", "source")
         self._late = self._counter("missed_deadlines", "Frames that were not finished by their deadline.")
-        self._rejected = self._counter("rejected_samples", "Samples that were not finite and count as black.")
+        self._rejected = self._counter("rejected_samples", "Samples that were no light, by why.", "reason")
+        for reason in fields(RejectedSamples):
+            self._rejected.labels(reason.name)
         self._sent = self._counter("image_bytes", "Bytes of images: encoded for requests, sent to viewers.", "via")
         self._superseded = self._counter("superseded_gazes", "Gazes that a newer one replaced unrendered.")
         self._dropped = self._counter("dropped_frames", "Frames that a viewer missed since it was not ready.")
@@ -51,7 +54,8 @@ class Metrics:
         self._cells.labels("traced").inc(cost.cells_traced)
         self._cells.labels("reused").inc(cost.cells_reused)
         self._maps.labels("cache" if cost.map_cached else "built").inc()
-        self._rejected.inc(cost.rejected_samples)
+        for reason, count in asdict(cost.rejected_samples).items():
+            self._rejected.labels(reason).inc(count)
         self._late.inc(cost.deadline_met is False)
         for stage, time_ms in stages_ms.items():
             self._stages.labels(stage).observe(time_ms / MS_PER_S)

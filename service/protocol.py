@@ -249,7 +249,7 @@ class Status(Record):
         frames: frames rendered.
         superseded: gazes that a newer one replaced before they were rendered.
         dropped: frames that viewers missed because they had not acknowledged the one before.
-        rejected: samples that were not finite and count as black.
+        rejected: samples that were no light: not a number, negative or infinite; 0 unless something is broken.
         viewers, gaze_sources: connections.
         gaze_state: `live`; `held`: invalid for a short time; `lost`: the whole screen is rendered evenly; `none` yet.
     """

@@ -266,8 +266,8 @@ class Studio:
             known_map, map_ms = self._check_cells(request)
             frame = self._renderer.render(prepared, request, abandon)
         cost = replace(frame.cost, map_cached=frame.cost.map_cached and known_map)
-        if cost.rejected_samples:
-            log.warning("%s: %d samples were not finite and count as black", scene_id, cost.rejected_samples)
+        if cost.rejected_samples.total:
+            log.warning("%s: samples that are no light: %s", scene_id, asdict(cost.rejected_samples))
         rendered = Rendered(replace(frame, cost=cost), map_ms, started_ns, time.monotonic_ns())
         self.metrics.frame(cost, rendered.stages())
         return rendered

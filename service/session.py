@@ -305,7 +305,7 @@ class Session:
             self._encode_ms += ENCODE_GAIN * (encoded.encode_ms - self._encode_ms)
             self._stage.studio.metrics.moved((encoded.finished_ns - asked_ns) / NS_PER_MS)
         progress.taken = Taken(step, attention, asked_ns, rendered)
-        self._counts.rejected += cost.rejected_samples
+        self._counts.rejected += cost.rejected_samples.total
         self._show(progress.taken, encoded)
 
     async def _rendered(self, configuration: Configuration, progress: Progress, step: Step) -> tuple[Rendered, Encoded]:

@@ -176,7 +176,7 @@ def of_file(path: Path) -> dict[str, str]:
             return {name: _as_text(value) for name, value in tomllib.load(file).items()}
     except OSError as error:
         raise ConfigError("config", "a file that can be read", f"{path}: {error.strerror}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (ValueError, RecursionError) as error:
         raise ConfigError("config", "TOML", f"{path}: {error}") from None
 
 

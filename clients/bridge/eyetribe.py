@@ -105,7 +105,7 @@ class EyeTribe(Codec):
                 None if lost else _point(eye["raw"]) for eye in (frame["lefteye"], frame["righteye"], frame)
             )
             ticks = float(frame["time"])
-        except (ValueError, KeyError, TypeError, AttributeError):
+        except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError):
             self.bad += 1
             return None
         return Sample(self._position, len(message), ticks, left, right, both)

@@ -45,7 +45,7 @@ class JsonLines(LineCodec):
         """The sample of a line."""
         try:
             record = json.loads(line.text)
-        except ValueError:
+        except (ValueError, RecursionError):
             raise BadRecord(line.text) from None
         found = {field: _at(record, path) for field, path in self._paths.items()}
         words = {field: _word(value) for field, value in found.items() if value is not _ABSENT}

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from clients.command_line.render import rejected_text
+
 
 def clip_record(costs: Sequence[dict[str, Any]], rendered: int) -> dict[str, Any]:
     """The cost of all frames together.
@@ -33,7 +35,7 @@ def clip_record(costs: Sequence[dict[str, Any]], rendered: int) -> dict[str, Any
         "rays": total("rays"),
         "effects": list(dict.fromkeys(effect for cost in costs for effect in cost["effects"])),
         "timing_ms": total("timing_ms"),
-        "rejected_samples": sum(cost["rejected_samples"] for cost in costs),
+        "rejected_samples": total("rejected_samples"),
     }
 
 
@@ -56,6 +58,5 @@ def clip_text(record: dict[str, Any]) -> str:
     ]  # fmt: skip
     if earlier:
         lines.insert(1, ("", f"{earlier:,} of them from an earlier run"))
-    if record["rejected_samples"]:
-        lines.append(("warning", f"{record['rejected_samples']:,} samples were not finite and count as black"))
+    lines += rejected_text(record["rejected_samples"])
     return "\n".join(f"{name:<8}{text}" for name, text in lines)

@@ -6,6 +6,7 @@ import argparse
 import json
 import os
 import time
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -233,9 +234,15 @@ def cost_record(frame: Frame, request: FrameRequest, extra_ms: dict[str, float])
         "effects": list(cost.effects),
         "effect_reasons": dict(zip(cost.effects, cost.effect_reasons, strict=True)),
         "error": {"rms": cost.rms_error, "foveal_rms": cost.foveal_rms_error, "guessed": round(cost.guessed_error, 4)},
-        "rejected_samples": cost.rejected_samples,
+        "rejected_samples": asdict(cost.rejected_samples),
         "timing_ms": {stage: round(ms, 3) for stage, ms in times.items()},
     }
+
+
+def rejected_text(rejected: dict[str, int]) -> list[tuple[str, str]]:
+    """A warning about samples that were no light, by why; none where there were none."""
+    found = [f"{count:,} {reason.replace('_', ' ')}" for reason, count in rejected.items() if count]
+    return [("warning", "samples that are no light: " + ", ".join(found))] if found else []
 
 
 def cost_text(record: dict[str, Any]) -> str:
@@ -265,6 +272,5 @@ def cost_text(record: dict[str, Any]) -> str:
     near = "" if foveal is None else f", {foveal:.5f} within 2.5 deg of the gaze"
     known = "estimated" if record["error"]["guessed"] < GUESSED else "guessed from neighbours"
     lines.append(("error", f"{record['error']['rms']:.5f} rms over the screen{near} ({known}, linear, 1 is white)"))
-    if record["rejected_samples"]:
-        lines.append(("warning", f"{record['rejected_samples']:,} samples were not finite and count as black"))
+    lines += rejected_text(record["rejected_samples"])
     return "\n".join(f"{name:<8}{text}" for name, text in lines)

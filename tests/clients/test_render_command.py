@@ -70,7 +70,8 @@ def test_render_prints_the_same_as_json(capsys: pytest.CaptureFixture[str]) -> N
     assert (cost["width"], cost["height"], cost["gaze"]) == (96, 54, {"x": -20.0, "y": 30.5})
     assert (cost["map"]["kind"], cost["map"]["bucket_px"], cost["map"]["cached"]) == ("aligned", 8, False)
     assert cost["cells_traced"] == cost["map"]["cells"] > 0
-    assert cost["cells_reused"] == cost["rejected_samples"] == 0
+    assert cost["cells_reused"] == 0
+    assert cost["rejected_samples"] == {"not_a_number": 0, "negative": 0, "too_bright": 0}
     assert cost["rays"] == {"primary": 3 * cost["map"]["cells"], "shadow": 0, "reflection": 0, "refraction": 0}
     assert cost["effects"] == []
     assert cost["error"]["rms"] >= 0

@@ -145,7 +145,7 @@ def test_costs_add_up(scene: PreparedScene, tiling: str, samples: int) -> None:
         assert cost.rays.primary == cost.samples_traced == samples * cost.cells_traced
         assert (cost.mean_samples, cost.acuity_scale, cost.deadline_met) == (samples, 16.0, None)
         assert cost.rays.total == sum(dataclasses.astuple(cost.rays))
-        assert cost.rejected_samples == 0
+        assert cost.rejected_samples.total == 0
         assert cost.effects == ("textures", "shadows", "reflection", "refraction")
         assert cost.guessed_error == (samples == 1)
         assert min(dataclasses.astuple(cost.time_ms)) >= 0

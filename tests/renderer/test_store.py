@@ -95,9 +95,9 @@ def sample(radiance: NDArray[np.float32], *parts: int) -> SampleStore:
     for length in parts:
         part = np.ascontiguousarray(radiance[:, start : start + length]).reshape(-1, 3)
         start += length
-        assert (
-            add_samples(store.samples, store.spread, store.white, slots, cells, np.full(2, start, np.int32), part) == 0
-        )
+        assert add_samples(
+            store.samples, store.spread, store.white, slots, cells, np.full(2, start, np.int32), part
+        ) == (0, 0, 0)
     return store
 
 
@@ -115,18 +115,12 @@ def test_sums_do_not_depend_on_the_parts_they_were_added_in() -> None:
 def test_cells_get_different_numbers_of_samples() -> None:
     radiance = np.random.default_rng(1).random((7, 3)).astype(np.float32)
     store, slots, both = SampleStore(2), np.array([1, 0]), np.array([0, 1], np.int32)
-    assert (
-        add_samples(
-            store.samples, store.spread, store.white, slots, both, np.array([2, 1], np.int32), radiance[[0, 1, 4]]
-        )
-        == 0
-    )
-    assert (
-        add_samples(
-            store.samples, store.spread, store.white, slots, both, np.array([4, 3], np.int32), radiance[[2, 3, 5, 6]]
-        )
-        == 0
-    )
+    assert add_samples(
+        store.samples, store.spread, store.white, slots, both, np.array([2, 1], np.int32), radiance[[0, 1, 4]]
+    ) == (0, 0, 0)
+    assert add_samples(
+        store.samples, store.spread, store.white, slots, both, np.array([4, 3], np.int32), radiance[[2, 3, 5, 6]]
+    ) == (0, 0, 0)
     assert store.samples.number.tolist() == [3, 4]
     np.testing.assert_allclose(store.samples.total[1], radiance[:4].sum(axis=0), rtol=1e-6)
     np.testing.assert_allclose(store.samples.total[0], radiance[4:].sum(axis=0), rtol=1e-6)

@@ -80,6 +80,7 @@ def test_the_header_says_what_is_shown_and_what_it_cost(client: httpx.Client) ->
         "frame", "scene", "width", "height", "format", "gaze", "map", "samples_per_cell", "samples", "acuity_scale",
         "deadline_ms", "deadline_met", "max_error", "error_met",
         "cells_traced", "cells_reused", "rays", "effects", "effect_reasons", "error",
+        "rejected_samples",
         "timing_ms", "service_time_ns",
     ]  # fmt: skip
     assert (header["scene"], header["width"], header["height"], header["format"]) == ("spheres", 96, 54, "png")

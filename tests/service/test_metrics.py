@@ -53,6 +53,8 @@ def test_a_request_counts_as_its_header_says(address: str, renderer: Renderer) -
     assert headers[1]["map"]["cached"]
     assert found["gazetrace_maps_total", "cache"] == sum(header["map"]["cached"] for header in headers)
     assert found["gazetrace_frames_total", "request"] == 2
+    for reason in ("not_a_number", "negative", "too_bright"):
+        assert found["gazetrace_rejected_samples_total", reason] == 0
     assert found["gazetrace_missed_deadlines_total",] == 2
     assert found["gazetrace_image_bytes_total", "request"] == sum(len(reply.content) for reply in replies)
     for stage in ("map", "trace", "reconstruct", "encode"):

@@ -82,7 +82,7 @@ def test_h08_a_face_that_names_a_corner_twice(renderer: Renderer, tmp_path: Path
         meshes = load(tmp_path, "a.obj", SQUARE + "s 1\n" + faces)
         camera = Camera((0.5, 0.5, 3), (0.5, 0.5, 0))
         frame = shoot(renderer, Scene(meshes=meshes, lights=(light(1, 2, 3, 9.0),), camera=camera), 32, 32)
-        assert frame.cost.rejected_samples == 0
+        assert frame.cost.rejected_samples.total == 0
         pictures.append(frame.pixels)
     assert (pictures[0] > 0).any()
     np.testing.assert_array_equal(pictures[1], pictures[0])

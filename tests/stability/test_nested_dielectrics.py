@@ -201,7 +201,7 @@ def test_h33_water_that_misses_its_glass_or_hardly_touches_it_is_finite(renderer
     assert np.isfinite(seen.pixels).all()
     assert seen.pixels.min() >= 0.0
     assert seen.pixels.max() <= 1 + 32 * U
-    assert seen.cost.rejected_samples == 0
+    assert seen.cost.rejected_samples.total == 0
     if abs(overlap) < 4e-6:
         assert seen.pixels.mean() == pytest.approx(truth.pixels.mean(), abs=0.02)
 

@@ -138,4 +138,4 @@ def test_h40_a_sphereflake_in_a_white_furnace_is_nowhere_brighter_than_1(
     assert np.isfinite(frame.pixels).all()
     assert frame.pixels.min() >= 0.0
     assert frame.pixels.max() <= 1 + 64 * U
-    assert frame.cost.rejected_samples == 0
+    assert frame.cost.rejected_samples.total == 0
