@@ -30,7 +30,7 @@ from embreex.rtcore import EmbreeDevice
 from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import NDArray
 
-from renderer.kernel import at, c_function, call, formula, kernel
+from renderer.kernel import COMPILED, at, c_function, call, formula, kernel
 
 log = logging.getLogger(__name__)
 
@@ -126,11 +126,7 @@ class EmbreeTriangles:
     @functools.cached_property
     def yardstick(self) -> EmbreeScene:
         """The same triangles as embreex traces them, ready: the fallback, and what benchmarks compare with."""
-        scene = EmbreeScene(DEVICE, robust=True)
-        TriangleMesh(scene, np.ascontiguousarray(self._vertices), np.ascontiguousarray(self._faces))
-        probe = np.zeros((1, 3), dtype=np.float32)
-        scene.run(probe, np.array([[0, 0, 1]], dtype=np.float32), None, "INTERSECT")
-        return scene
+        return plain_scene(self._vertices, self._faces, robust=True)
 
     def nearest(
         self, origin: NDArray[np.float32], direction: NDArray[np.float32], coherent: bool = True
@@ -201,9 +197,23 @@ class EmbreeTriangles:
         )  # fmt: skip
 
 
+def plain_scene(vertices: NDArray[np.float32], faces: NDArray[np.int32], *, robust: bool) -> EmbreeScene:
+    """Triangles for embreex's own queries, ready, searched by Embree's robust traversal or by its fast one."""
+    scene = EmbreeScene(DEVICE, robust=robust)
+    TriangleMesh(scene, np.ascontiguousarray(vertices), np.ascontiguousarray(faces))
+    probe = np.zeros((1, 3), dtype=np.float32)
+    scene.run(probe, np.array([[0, 0, 1]], dtype=np.float32), None, "INTERSECT")
+    return scene
+
+
 @functools.cache
 def packets() -> Packets | None:
-    """The C library if it answers known rays as embreex does; None, with a line in the log, if not."""
+    """The C library if it answers known rays as embreex does; None, with a line in the log, if not.
+
+    None too where nothing is compiled: only compiled code can call it.
+    """
+    if not COMPILED:
+        return None
     try:
         found = _open_library()
     except (OSError, AttributeError, ValueError) as problem:

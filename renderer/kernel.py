@@ -57,6 +57,9 @@ def _forget_old_versions(place: Path) -> None:
 numba.config.CACHE_DIR = str(_cache_folder())  # type: ignore[attr-defined]
 
 
+COMPILED: bool = not numba.config.DISABLE_JIT  # type: ignore[attr-defined]
+"""False with NUMBA_DISABLE_JIT=1: kernels are then plain Python, which checks every index, and takes its time."""
+
 _OPTIONS: dict[str, Any] = {"nogil": True, "cache": True, "error_model": "numpy"}
 _MAKES_NO_ARRAYS: dict[str, Any] = {"_nrt": False}
 
@@ -105,7 +108,7 @@ def _prefetch(_context: Any, rows: Any, row: Any) -> Any:
     return types.void(rows, row), generate
 
 
-prefetch: Any = intrinsic(_prefetch)
+prefetch: Any = intrinsic(_prefetch) if COMPILED else lambda _rows, _row: None
 
 
 def _call(_context: Any, _function: Any, _a: Any, _b: Any, _c: Any, _d: Any) -> Any:
