@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 import shlex
 import sys
 from collections.abc import Sequence
@@ -18,6 +19,7 @@ from clients.command_line.accuracy_text import accuracy_text
 from clients.command_line.errors import OK, UsageError
 from clients.command_line.fingerprint import fingerprint
 from clients.command_line.frame_flags import add_frame_flags, frame_request
+from clients.command_line.numerics_text import numerics_record, numerics_text
 from clients.command_line.progress import counting
 from clients.command_line.render import add_threads, check_threads, write_whole
 from clients.command_line.scene_argument import SCENE_HELP, add_scenes_folder, load_scene
@@ -47,6 +49,9 @@ examples:
   gazetrace accuracy atrium --gaze 600,400 -o atrium
       All settings at 1920x1080, each timed five times; some 20 minutes on two cores.
 
+  gazetrace accuracy --numerics
+      What numerical care costs and what it saves: robust or fast, float64 or float32, and more, in a minute.
+
   gazetrace accuracy my-scenes/vase --size 2560x1440 --screen-cm 60 --repeats 9 --json -o vase
       Another scene and screen, timed more often, as JSON on standard output too."""
 
@@ -68,8 +73,13 @@ def add(commands: argparse._SubParsersAction[Any]) -> None:
         epilog=EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("scene", metavar="SCENE", help=SCENE_HELP)
-    parser.add_argument("-o", "--output", type=Path, required=True, metavar="DIR", help="folder for what is found")
+    parser.add_argument("scene", nargs="?", metavar="SCENE", help=SCENE_HELP)
+    parser.add_argument("-o", "--output", type=Path, metavar="DIR", help="folder for what is found")
+    parser.add_argument(
+        "--numerics",
+        action="store_true",
+        help="instead, measure the renderer's numerical choices against others; needs no SCENE and no DIR",
+    )
     width, height = QUICK_SIZE
     parser.add_argument(
         "--quick", action="store_true", help=f"fewer settings, repeats and samples; {width}x{height} unless --size"
@@ -98,6 +108,8 @@ def add(commands: argparse._SubParsersAction[Any]) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Measure what is missing, write it down, print it."""
+    if arguments.numerics:
+        return _numerics(as_json=arguments.json)
     _complete(arguments)
     frame_request(arguments, Camera(), quality=Quality())  # complain about a flag before a scene takes seconds to load
     prepared = load_scene(arguments.scene, arguments.scenes_folder)
@@ -126,12 +138,28 @@ def run(arguments: argparse.Namespace) -> int:
     return OK
 
 
+def _numerics(*, as_json: bool) -> int:
+    """Measure and print the numerical choices."""
+    from renderer.numerics import CHAPTERS
+
+    with counting("measuring numerical choices", len(CHAPTERS)) as tick:
+        chapters = {}
+        for subject, measure in CHAPTERS.items():
+            chapters[subject] = measure()
+            tick()
+    print(json.dumps(numerics_record(chapters), indent=2) if as_json else numerics_text(chapters))
+    return OK
+
+
 def _complete(arguments: argparse.Namespace) -> None:
     """Fill in what depends on `--quick`, and check what no record does.
 
     Raises:
         UsageError: naming the flag.
     """
+    missing = [name for name, value in (("SCENE", arguments.scene), ("-o/--output", arguments.output)) if value is None]
+    if missing:
+        raise UsageError(f"the following arguments are required: {', '.join(missing)}")
     check_threads(arguments.threads)
     display = Display()
     arguments.size = arguments.size or (QUICK_SIZE if arguments.quick else (display.width_px, display.height_px))
