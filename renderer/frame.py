@@ -82,6 +82,12 @@ class RejectedSamples:
     negative: int = 0
     too_bright: int = 0
 
+    def __add__(self, other: RejectedSamples) -> RejectedSamples:
+        """Both together."""
+        return RejectedSamples(
+            self.not_a_number + other.not_a_number, self.negative + other.negative, self.too_bright + other.too_bright
+        )
+
     @property
     def total(self) -> int:
         """All of them."""

@@ -337,4 +337,5 @@ def spent(request: FrameRequest, cost: FrameCost) -> dict[str, object]:
         "effects": list(cost.effects),
         "effect_reasons": dict(zip(cost.effects, cost.effect_reasons, strict=True)),
         "error": {"rms": cost.rms_error, "foveal_rms": cost.foveal_rms_error, "guessed": round(cost.guessed_error, 4)},
+        "rejected_samples": asdict(cost.rejected_samples),
     }
