@@ -1,6 +1,7 @@
 // The page put together: a full-screen picture that follows the eye, and beside it what that costs.
 
 import { Stage } from "./canvas.js";
+import { Dial } from "./dial.js";
 import { PointerGaze } from "./gaze.js";
 import { Keys } from "./keys.js";
 import { askToken, Notices } from "./notices.js";
@@ -27,6 +28,11 @@ const token = new Token(askToken);
 const service = new Service(token);
 const screen = new ScreenSize();
 const settings = new Settings({ form: element("settings"), onChange: changed });
+const dial = new Dial({
+  service,
+  onPick: (setting) => (setting ? settings.turnTo(setting) : dial.follow(settings.quality)),
+  onError: refuse,
+});
 const orbit = new Orbit({ view, onTurn: want });
 const stage = new Stage({ view, stage: element("stage"), frame: element("frame"), onResize: want });
 const stream = new Stream({
@@ -76,6 +82,7 @@ function want() {
   const size = stage.displaySize(settings.size);
   const pitchCm = screen.pitchCm(stage.ratio) * stage.scaleOf(size);
   quality = settings.quality;
+  dial.follow(quality);
   tellScreen(size, pitchCm);
   stream.want({
     scene,
@@ -180,6 +187,7 @@ function tellScreen(size, pitchCm) {
 function chooseScene() {
   scene = decodeURIComponent(location.hash.slice(1)) || scene;
   orbit.home = null;
+  dial.forScene(scene);
   picker.choose(scene);
   notices.status(`Loading ${scene} …`);
   want();

@@ -54,6 +54,12 @@ export class Service {
     return this.#json(`v1/scenes/${encodeURIComponent(id)}`);
   }
 
+  /** What accuracy costs for a scene: {table}, or {progress} where it is being measured. */
+  async accuracy(id) {
+    const reply = await this.#fetch(`v1/scenes/${encodeURIComponent(id)}/accuracy`);
+    return { [reply.status === 202 ? "progress" : "table"]: await reply.json() };
+  }
+
   /** The fields of a request's quality, as JSON schema: which values this service knows. */
   async qualitySchema() {
     const { schemas } = (await this.#json("openapi.json")).components;

@@ -114,6 +114,15 @@ export class Settings {
     this.#onChange("source");
   }
 
+  /** Take over what a quality says of cells and samples; all of the samples, whatever the error. */
+  turnTo({ map, samples_per_cell, scale }) {
+    this.#field("map").value = map;
+    this.#field("samples_per_cell").value = samples_per_cell;
+    this.#field("scale").value = Math.round(4 * Math.log2(scale)) / 2;
+    this.#field("max_error").value = "";
+    this.#changed(this.#field("samples_per_cell"));
+  }
+
   /** Twice or half as many samples a cell. */
   stepSamples(up) {
     const select = this.#field("samples_per_cell");
