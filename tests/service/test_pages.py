@@ -33,7 +33,8 @@ def test_the_openapi_document_is_of_this_service(client: httpx.Client) -> None:
     document = client.get("/openapi.json").json()
     assert document["info"]["version"] == package_version()
     assert set(document["paths"]) == {
-        "/v1/render", "/v1/scenes", "/v1/scenes/{scene_id}", "/v1/scenes/{scene_id}/frame", "/v1/cellmap",
+        "/v1/render", "/v1/scenes", "/v1/scenes/{scene_id}", "/v1/scenes/{scene_id}/frame",
+        "/v1/scenes/{scene_id}/accuracy", "/v1/cellmap",
         "/v1/sessions", "/healthz", "/readyz", "/metrics",
     }  # fmt: skip
     assert "securitySchemes" not in document["components"]
