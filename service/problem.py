@@ -113,6 +113,9 @@ def _later(detail: str, kind: str) -> Response:
 def _http(request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)
     detail = str(error.detail)
+    if error.status_code == HTTPStatus.BAD_REQUEST:
+        item = FieldError(field="body", message="expected JSON in UTF-8")
+        return problem(422, f"{item.field}: {item.message}", "invalid-request", [item])
     if error.status_code == HTTPStatus.NOT_FOUND:
         detail = f"no such path: {request.url.path}; /docs lists what there is"
     elif error.status_code == HTTPStatus.METHOD_NOT_ALLOWED:

@@ -34,6 +34,9 @@ HELLO_S = 10.0
 LONGEST_REASON_BYTES = 123
 """Of a close frame (RFC 6455, 5.5)."""
 
+ABNORMAL_CLOSURE = 1006
+"""Code for a connection that ended without one (RFC 6455, 7.1.5)."""
+
 router = APIRouter(tags=["streams"])
 
 
@@ -100,8 +103,8 @@ async def _answer(websocket: WebSocket, talk: Callable[[WebSocket, Desk], Awaita
             raise Refused(CloseCode.STOPPING, protocol.Error("stopping", str(error))) from None
     except Refused as refused:
         with contextlib.suppress(WebSocketDisconnect):
-            await websocket.send_text(protocol.encode(refused.error))
-            await websocket.close(refused.code, _reason(refused.error.message))
+            await _deliver(websocket.send_text(protocol.encode(refused.error)))
+            await _deliver(websocket.close(refused.code, _reason(refused.error.message)))
     except WebSocketDisconnect:
         return
 
@@ -223,12 +226,24 @@ async def _send(websocket: WebSocket, outbox: Outbox) -> None:
     while True:
         match await outbox.next():
             case Close() as end:
-                await websocket.close(end.code, _reason(end.reason))
+                await _deliver(websocket.close(end.code, _reason(end.reason)))
                 return
             case str() as text:
-                await websocket.send_text(text)
+                await _deliver(websocket.send_text(text))
             case data:
-                await websocket.send_bytes(data)
+                await _deliver(websocket.send_bytes(data))
+
+
+async def _deliver(sending: Awaitable[None]) -> None:
+    """Send something.
+
+    Raises:
+        WebSocketDisconnect: if the connection has ended, be it that the server ended it because of a damaged frame.
+    """
+    try:
+        await sending
+    except RuntimeError:
+        raise WebSocketDisconnect(ABNORMAL_CLOSURE) from None
 
 
 async def _first_text(websocket: WebSocket) -> str:

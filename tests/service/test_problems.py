@@ -42,6 +42,10 @@ def post(client: httpx.Client, text: str | bytes) -> httpx.Response:
     return client.post("/v1/render", content=text, headers={"Content-Type": "application/json"})
 
 
+def test_a_body_that_is_no_text_is_told_so(client: httpx.Client) -> None:
+    expect_problem(post(client, b'{"scene": "\xff"}'), 422, "invalid-request", "body")
+
+
 @pytest.mark.parametrize(
     ("body", "field"),
     [

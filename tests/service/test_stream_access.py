@@ -52,6 +52,24 @@ def test_what_the_wire_does_not_allow_ends_the_stream(address: str, said: str | 
             assert (code, error.code, error.field) == (CloseCode.PROTOCOL, "protocol", field)
 
 
+@pytest.mark.parametrize("path", ["/v1/stream", "/v1/gaze?session=damaged"])
+def test_a_damaged_frame_ends_the_stream_while_answers_are_due(
+    address: str, path: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    """The server ends such a connection by itself, and nobody calls it a mistake of ours."""
+    said = [protocol.encode(protocol.Ping(1, 0)).encode()] * 3 + [b"no message"]
+    whole = b"".join(bytes([0x81, 0x80 | len(text)]) + bytes(4) + text for text in said)
+    damaged = bytes([0xF3, 0x80]) + bytes(4)
+    for _ in range(20):
+        with peer(address, path, DECODE) as found:
+            found.connection.socket.sendall(whole)
+            found.connection.socket.sendall(damaged)
+            assert found.closed()[0] in (1002, CloseCode.PROTOCOL)
+    while "damaged" in sessions(address) and sessions(address)["damaged"]["gaze_sources"]:
+        pass
+    assert [record.getMessage() for record in caplog.records if record.levelname == "ERROR"] == []
+
+
 def test_hello_comes_first_or_not_at_all(address: str) -> None:
     with viewer(address) as found:
         found.say(Hello())

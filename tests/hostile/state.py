@@ -1,0 +1,65 @@
+"""What a service must be like after an attack: nothing kept, nothing said by a mistake, and others are served."""
+
+from __future__ import annotations
+
+import time
+
+import httpx
+
+from tests.service.conftest import PATIENCE_S
+from tests.service.process import ServiceProcess
+from tests.service.streaming import configure, sessions, viewer
+
+FLAGS = (
+    "--threads", "1", "--max-pixels", "4096", "--max-camera-rays", "20000", "--max-sessions", "16",
+    "--session-expiry-s", "1", "--map-cache-bytes", str(8 << 20), "--store-bytes", str(8 << 20),
+    "--scene-bytes", str(256 << 20),
+)  # fmt: skip
+"""A small service that forgets soon."""
+
+MORE_DESCRIPTORS = 8
+MORE_THREADS = 16
+"""Threads are begun as they are needed, up to the sizes of the queues."""
+
+MORE_BYTES = 192 << 20
+"""What scenes, caches and the allocator's own reserves may come to."""
+
+
+def use(service: ServiceProcess) -> None:
+    """What a client in good faith does: one frame over a stream, and one of each route."""
+    with viewer(service.address) as found:
+        found.say(configure(display={"width_px": 32, "height_px": 18}))
+        found.final()
+    query = {"gaze_x": 1, "gaze_y": 1, "width_px": 32, "height_px": 18}
+    for path in ("/v1/scenes", "/v1/cellmap", "/v1/scenes/spheres/frame", "/metrics", "/readyz"):
+        asked = query if "map" in path or "frame" in path else {}
+        assert httpx.get(service.address + path, params=asked, timeout=PATIENCE_S).status_code == 200
+
+
+class Before:
+    """A service before an attack."""
+
+    def __init__(self, service: ServiceProcess) -> None:
+        use(service)
+        self._service = service
+        self._descriptors = service.descriptors
+        self._threads = service.threads
+        self._resident_bytes = service.resident_bytes
+
+    def check(self) -> str:
+        """Raise AssertionError unless it is as it was; the figures, for people."""
+        service = self._service
+        use(service)
+        until = time.monotonic() + PATIENCE_S
+        while (left := sessions(service.address)) or service.descriptors > self._descriptors + MORE_DESCRIPTORS:
+            assert time.monotonic() < until, f"{service.descriptors} descriptors, sessions {left}"
+        wrong = [line for line in service.lines if "Traceback" in line or "Error" in line or "mistake" in line]
+        assert not wrong, service.lines[-60:]
+        grown = service.resident_bytes - self._resident_bytes
+        figures = (
+            f"memory {self._resident_bytes >> 20} MiB before, {grown / (1 << 20):+.0f} MiB after; "
+            f"descriptors {self._descriptors}, {service.descriptors}; threads {self._threads}, {service.threads}"
+        )
+        assert grown < MORE_BYTES, figures
+        assert service.threads <= self._threads + MORE_THREADS, figures
+        return figures

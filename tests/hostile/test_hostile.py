@@ -1,0 +1,40 @@
+"""The short forms of the attacks, and that they reach what they attack."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+
+from tests.hostile.requests import ask
+from tests.hostile.state import FLAGS, Before
+from tests.hostile.stream import attack
+from tests.service.process import ServiceProcess, service_process
+
+CASES = 200
+MESSAGES = 1500
+
+
+@pytest.fixture(scope="module")
+def service() -> Iterator[ServiceProcess]:
+    with service_process(*FLAGS) as service:
+        yield service
+
+
+def test_every_reply_to_a_request_made_up_is_one_that_is_promised(service: ServiceProcess) -> None:
+    before = Before(service)
+    asked = ask(service.address, CASES)
+    assert not asked.wrong
+    assert asked.statuses.total() >= CASES / 2
+    assert asked.statuses[200]
+    assert asked.statuses[422]
+    before.check()
+
+
+def test_mutated_messages_break_leak_and_block_nothing(service: ServiceProcess) -> None:
+    before = Before(service)
+    attacked = attack(service.address, MESSAGES)
+    assert attacked.sent >= MESSAGES
+    assert not attacked.mistakes
+    assert attacked.closes[4400]
+    before.check()
