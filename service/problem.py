@@ -28,6 +28,8 @@ CLIENT_CLOSED_REQUEST = 499
 RETRY_AFTER_S = 1
 """When a client that was turned away may ask again [s]."""
 
+OUT_OF_MEMORY = "this service has too little memory for it now; a smaller frame needs less"
+
 Answer = Callable[[Request, Exception], Response]
 """What a kind of error is answered with."""
 
@@ -90,6 +92,7 @@ def answer_errors(app: FastAPI) -> None:
         NotReady: lambda _, error: _later(str(error), "not-ready"),
         Busy: lambda _, error: _later(str(error), "busy"),
         Stopping: lambda _, error: _later(str(error), "stopping"),
+        MemoryError: _out_of_memory,
         ClientLeft: lambda *_: Response(status_code=CLIENT_CLOSED_REQUEST),
         Exception: _mistake,
     }
@@ -108,6 +111,11 @@ def _at_once(answer: Answer) -> Callable[[Request, Exception], Awaitable[Respons
 
 def _later(detail: str, kind: str) -> Response:
     return problem(503, detail, kind, headers={"Retry-After": str(RETRY_AFTER_S)})
+
+
+def _out_of_memory(request: Request, error: Exception) -> Response:
+    log.error("%s %s: out of memory: %s", request.method, request.url.path, error)
+    return _later(OUT_OF_MEMORY, "out-of-memory")
 
 
 def _http(request: Request, error: Exception) -> Response:

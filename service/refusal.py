@@ -8,7 +8,7 @@ from pydantic import ValidationError
 
 from renderer.errors import SceneError, SettingsError, UnknownScene
 from service import protocol
-from service.problem import field_error, shown
+from service.problem import OUT_OF_MEMORY, field_error, shown
 from service.rendering import NotReady, OverLimit
 
 log = logging.getLogger(__name__)
@@ -35,6 +35,9 @@ def refusal(error: Exception) -> protocol.Error:
         return protocol.Error("not-ready", str(error))
     if isinstance(error, protocol.ProtocolError):
         return protocol.Error("protocol", _cut(error.message), _cut(error.field))
+    if isinstance(error, MemoryError):
+        log.error("a stream is out of memory: %s", error)
+        return protocol.Error("out-of-memory", OUT_OF_MEMORY)
     log.error("a stream failed", exc_info=error)
     return protocol.Error("mistake", "this failed by a mistake of the service; its log says more")
 

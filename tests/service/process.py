@@ -64,6 +64,15 @@ class ServiceProcess:
         self._process.stdout.close()
 
     @property
+    def pid(self) -> int:
+        return self._process.pid
+
+    @property
+    def address_space_bytes(self) -> int:
+        """All that it has mapped, in use or not."""
+        return int(self._proc("statm").read_text().split()[0]) * os.sysconf("SC_PAGE_SIZE")
+
+    @property
     def resident_bytes(self) -> int:
         """Memory of it that is in use."""
         pages = int(self._proc("statm").read_text().split()[1])

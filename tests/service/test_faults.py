@@ -1,0 +1,110 @@
+"""Faults for real, against a service in a process of its own: what was promised, and that nothing more is lost."""
+
+from __future__ import annotations
+
+import asyncio
+import resource
+import signal
+import socket
+import time
+from collections.abc import Mapping
+
+import httpx
+
+from clients.display import Display
+from service.protocol import CloseCode
+from tests.service.conftest import PATIENCE_S
+from tests.service.process import ServiceProcess, service_process
+from tests.service.streaming import configure, viewer
+
+DRAIN_S = 5.0
+"""How long a service may take to end."""
+
+BUSY_S = 5.0
+"""What a busy machine may add."""
+
+SMALL: dict[str, str | int] = {"gaze_x": 1, "gaze_y": 1, "width_px": 64, "height_px": 36}
+HUGE: dict[str, str | int] = {
+    "gaze_x": 1,
+    "gaze_y": 1,
+    "width_px": 7680,
+    "height_px": 4320,
+    "map": "full",
+    "samples_per_cell": 1,
+}
+
+SPARE_BYTES = 256 << 20
+"""Memory that a service is left: enough for a small frame, too little for an 8K one, whose radiance takes 400 MB."""
+
+
+def frame(service: ServiceProcess, query: Mapping[str, str | int]) -> httpx.Response:
+    return httpx.get(f"{service.address}/v1/scenes/matte/frame", params=query, timeout=PATIENCE_S)
+
+
+def test_out_of_memory_fails_one_request_and_no_other() -> None:
+    with service_process("--threads", "1") as service:
+        assert frame(service, SMALL).status_code == 200
+        limit = service.address_space_bytes + SPARE_BYTES
+        resource.prlimit(service.pid, resource.RLIMIT_AS, (limit, limit))
+        refused = frame(service, HUGE)
+        assert refused.status_code == 503
+        assert refused.json()["type"] == "urn:gazetrace:problem:out-of-memory"
+        assert refused.headers["Retry-After"]
+        assert frame(service, {**SMALL, "gaze_x": 60}).status_code == 200
+        with viewer(service.address) as found:
+            found.say(configure())
+            assert found.final().header.phase == "final"
+
+
+def test_a_service_told_to_stop_sends_its_viewers_away_and_ends() -> None:
+    """Streams at rest and at work, one that reads nothing, and a request that is half there."""
+    with service_process("--threads", "1") as service:
+        host, port = service.address.removeprefix("http://").split(":")
+        with (
+            viewer(service.address) as resting,
+            viewer(service.address) as working,
+            viewer(service.address) as deaf,
+            socket.create_connection((host, int(port))) as half,
+        ):
+            half.sendall(b"GET /healthz HTTP/1.1\r\n")
+            resting.say(configure())
+            resting.final()
+            deaf.say(configure())
+            working.say(configure(display={"width_px": 1280, "height_px": 720}, quality={"samples_per_cell": 64}))
+            working.frame()
+            began = time.monotonic()
+            service.signal(signal.SIGTERM)
+            assert [each.closed()[0] for each in (resting, working)] == [CloseCode.STOPPING] * 2
+            assert service.ended() == -signal.SIGTERM
+            assert time.monotonic() - began < DRAIN_S + BUSY_S
+    assert not [line for line in service.lines if "Traceback" in line], service.lines
+
+
+def test_a_display_resumes_its_session_with_a_service_that_was_killed_and_started_again() -> None:
+    async def work() -> None:
+        first = await asyncio.to_thread(ServiceProcess, "--threads", "1")
+        second = None
+        try:
+            await asyncio.to_thread(first.wait_ready)
+            port = first.address.rpartition(":")[2]
+            async with Display(first.address, session="lab", patience_s=PATIENCE_S) as display:
+                await display.configure("matte", display={"width_px": 64, "height_px": 36})
+                display.look_at(10, 20)
+                while (await display.next_frame()).header.phase != "final":
+                    pass
+                first.signal(signal.SIGKILL)
+                await asyncio.to_thread(first.ended)
+                seq = display.look_at(50, 20)
+                second = await asyncio.to_thread(ServiceProcess, "--threads", "1", "--port", port)
+                while True:
+                    last = (await display.next_frame()).header
+                    if last.phase == "final" and last.gaze is not None and last.gaze.seq == seq:
+                        break
+                assert (last.session, last.scene, last.width) == ("lab", "matte", 64)
+                assert display.connections >= 2
+        finally:
+            first.stop()
+            if second is not None:
+                second.stop()
+
+    asyncio.run(asyncio.wait_for(work(), 2 * PATIENCE_S))
