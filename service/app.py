@@ -24,6 +24,7 @@ from service.metrics import Metrics
 from service.openapi import describe_api
 from service.problem import answer_errors
 from service.rendering import Studio
+from service.request_log import RequestLog
 from service.sessions import Sessions
 from service.settings import Settings
 from service.stage import Stage
@@ -95,7 +96,7 @@ def create_app(
 
 def _gates(settings: Settings) -> list[Middleware]:
     """What a request passes, outermost first."""
-    gates = [Middleware(SafeHeaders), Middleware(OwnNamesOnly, settings=settings)]
+    gates = [Middleware(RequestLog), Middleware(SafeHeaders), Middleware(OwnNamesOnly, settings=settings)]
     if settings.allowed_origins:
         gates.append(
             Middleware(

@@ -80,10 +80,18 @@ class JobQueue:
         """Drop the jobs in the queue and take no more; those that have begun end by themselves."""
         self._executor.shutdown(wait=False, cancel_futures=True)
 
+    def require_place(self) -> None:
+        """Return if there is one for another job.
+
+        Raises:
+            Busy: if not.
+        """
+        if self._taken >= self.places:
+            raise Busy(f"{self.places} requests are being worked on or waiting, and there is room for no more")
+
     def _submit(self, job: Callable[[], Result]) -> Future[Result]:
         with self._lock:
-            if self._taken >= self.places:
-                raise Busy(f"{self.places} requests are being worked on or waiting, and there is room for no more")
+            self.require_place()
             self._taken += 1
         begun = self._executor.submit(job)
         begun.add_done_callback(self._free)

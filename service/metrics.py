@@ -34,6 +34,7 @@ class Metrics:
         self._sent = self._counter("image_bytes", "Bytes of images: encoded for requests, sent to viewers.", "via")
         self._superseded = self._counter("superseded_gazes", "Gazes that a newer one replaced unrendered.")
         self._dropped = self._counter("dropped_frames", "Frames that a viewer missed since it was not ready.")
+        self._refused = self._counter("refusals", "Requests and clients of streams refused, by kind.", "via", "kind")
         self._stages = self._histogram("stage_seconds", "Time of each stage of a frame.", "stage")
         self._latency = self._histogram(
             "gaze_to_frame_seconds", "From the arrival of a gaze to the encoded frame that follows a move of it."
@@ -72,6 +73,10 @@ class Metrics:
     def moved(self, total_ms: float) -> None:
         """The first frame after a move of the gaze was finished."""
         self._latency.observe(total_ms / MS_PER_S)
+
+    def refused(self, via: str, kind: str) -> None:
+        """A request (`http`) was refused, or a client of a stream (`websocket`) sent away."""
+        self._refused.labels(via, kind).inc()
 
     def superseded(self) -> None:
         """A gaze was replaced before it was rendered."""

@@ -77,8 +77,9 @@ async def healthz() -> Health:
 
 @router.get("/readyz", tags=["health"], summary="Can frames be rendered?", responses={503: ERRORS[503]})
 async def readyz(desk: TheDesk) -> Readiness:
-    """Answer 503 until the kernels are compiled."""
+    """Answer 503 until the kernels are compiled, and while there is no place for another frame."""
     desk.studio.require_ready()
+    desk.renders.require_place()
     return Readiness(running=desk.renders.running, waiting=desk.renders.waiting)
 
 

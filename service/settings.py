@@ -48,6 +48,7 @@ class Settings:
         certfile: certificate chain (PEM), to serve HTTPS.
         keyfile: its private key (PEM); None if it is in `certfile`.
         insecure: True to listen beyond this machine without a token.
+        log_json: True to write a line of JSON to standard error for each request and stream.
         scenes: folder of scene folders; None for the built-in scenes alone.
         threads: cores to render on; None for all.
         max_pixels: largest frame [px]; an 8K screen.
@@ -83,6 +84,7 @@ class Settings:
     certfile: Path | None = None
     keyfile: Path | None = None
     insecure: bool = False
+    log_json: bool = False
     scenes: Path | None = None
     threads: int | None = None
     max_pixels: int = 33_177_600
@@ -239,6 +241,7 @@ _READ: Mapping[str, Callable[[str, str], object]] = {
     "certfile": _path,
     "keyfile": _path,
     "insecure": _switch,
+    "log_json": _switch,
     "scenes": _path,
     "allowed_hosts": _list,
     "allowed_origins": _list,

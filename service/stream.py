@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import logging
 from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine
 from dataclasses import replace
 from typing import Annotated, Any
@@ -25,6 +26,7 @@ from service.record import plain
 from service.refusal import refusal
 from service.rendering import OverLimit
 from service.request import NoQuery, StreamBody
+from service.request_log import name_session
 from service.session import Session
 from service.sessions import TooMany
 
@@ -36,6 +38,8 @@ LONGEST_REASON_BYTES = 123
 
 ABNORMAL_CLOSURE = 1006
 """Code for a connection that ended without one (RFC 6455, 7.1.5)."""
+
+log = logging.getLogger(__name__)
 
 router = APIRouter(tags=["streams"])
 
@@ -114,6 +118,7 @@ async def _view(websocket: WebSocket, desk: Desk) -> None:
     hello = first if isinstance(first, protocol.Hello) else protocol.Hello()
     rights = _check_token(websocket, hello, Right.VIEW)
     session, viewer = desk.sessions.view(hello.session)
+    name_session(websocket.scope, session.name)
 
     async def hear(message: protocol.StreamUp) -> None:
         if isinstance(message, protocol.Gaze) and Right.GAZE not in rights:
@@ -139,6 +144,7 @@ async def _feed(websocket: WebSocket, desk: Desk) -> None:
     else:
         _check_token(websocket, protocol.Hello(), Right.GAZE)
     session, source = desk.sessions.feed(name)
+    name_session(websocket.scope, name)
 
     async def listen() -> None:
         async for text in _texts(websocket, desk):
@@ -155,7 +161,9 @@ async def _hear_viewer(session: Session, viewer: Outbox, message: protocol.Strea
             try:
                 await session.configure(message.id, _body(session, message))
             except (LookupError, OverLimit, RenderError, ValidationError) as error:
-                viewer.tell(replace(refusal(error), id=message.id))
+                refused = replace(refusal(error), id=message.id)
+                log.info("session %s: %s refused: %s", session.name, message.type, refused.message)
+                viewer.tell(refused)
         case protocol.Gaze():
             session.look([message])
         case protocol.Ack():

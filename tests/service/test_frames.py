@@ -246,11 +246,12 @@ def test_a_full_queue_sends_away_and_a_client_that_leaves_frees_its_place(
                 b"POST /v1/render HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
                 b"Content-Length: %d\r\n\r\n%b" % (len(body), body)
             )
-            _await_readiness(client, {"running": 1, "waiting": 1})
-            refused = client.post("/v1/render", json=ORDER)
-            assert refused.status_code == 503
-            assert refused.json()["type"] == "urn:gazetrace:problem:busy"
-            assert int(refused.headers["retry-after"]) >= 1
+            while client.get("/readyz").status_code == 200:
+                assert not long.done()
+            for refused in (client.get("/readyz"), client.post("/v1/render", json=ORDER)):
+                assert refused.status_code == 503
+                assert refused.json()["type"] == "urn:gazetrace:problem:busy"
+                assert int(refused.headers["retry-after"]) >= 1
         _await_readiness(client, {"running": 1, "waiting": 0})
         assert not long.done()
         assert client.post("/v1/render", json=ORDER).status_code == 200
