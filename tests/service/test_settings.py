@@ -18,6 +18,7 @@ STATED = {
     "view_token": ("another-token", "another-token"),
     "gaze_token": ("a-third-token", "a-third-token"),
     "insecure": ("yes", True),
+    "log_json": ("on", True),
     "threads": ("3", 3),
     "max_pixels": ("1000", 1000),
     "max_samples_per_cell": ("8", 8),
