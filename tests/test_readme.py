@@ -101,6 +101,7 @@ def test_each_command_works(words: list[str], tmp_path: Path, monkeypatch: pytes
     small = ["--size", "64x36", "--samples", "1"] if words[0] in shrinks else []
     small += ["--repeats", "1"] if words[0] in ("accuracy", "figures") else []
     small += ["--size", "32x18", "--reference-samples", "2", "--no-report"] if words[0] == "accuracy" else []
+    small += ["--seconds", "0.2"] if "--temporal" in words else []
     small += ["--seconds", {"animate": "0.1", "watch": "1.5"}[words[0]]] if words[0] in ("animate", "watch") else []
     assert main([*words, *small]) == 0
     if "-o" in words:

@@ -15,10 +15,12 @@ from typing import TYPE_CHECKING, Any, Final
 
 from clients.command_line.accuracy_folder import AccuracyFolder
 from clients.command_line.accuracy_steps import measure_missing
+from clients.command_line.accuracy_temporal import WALK_S, measure_flicker
 from clients.command_line.accuracy_text import accuracy_text
 from clients.command_line.errors import OK, UsageError
 from clients.command_line.fingerprint import fingerprint
 from clients.command_line.frame_flags import add_frame_flags, frame_request
+from clients.command_line.gaze_trace_flags import SIMULATED, add_gaze_trace_flags
 from clients.command_line.numerics_text import numerics_record, numerics_text
 from clients.command_line.progress import counting
 from clients.command_line.render import add_threads, check_threads, write_whole
@@ -48,6 +50,9 @@ examples:
 
   gazetrace accuracy atrium --gaze 600,400 -o atrium
       All settings at 1920x1080, each timed five times; some 20 minutes on two cores.
+
+  gazetrace accuracy atrium --temporal --gaze-trace eye.csv -o atrium
+      What flickers when only the gaze moves, for a recorded eye, in a minute; a section of the page in the same DIR.
 
   gazetrace accuracy --numerics
       What numerical care costs and what it saves: robust or fast, float64 or float32, and more, in a minute.
@@ -80,6 +85,11 @@ def add(commands: argparse._SubParsersAction[Any]) -> None:
         action="store_true",
         help="instead, measure the renderer's numerical choices against others; needs no SCENE and no DIR",
     )
+    parser.add_argument(
+        "--temporal",
+        action="store_true",
+        help="instead, measure what changes on the screen when only the gaze moves; on a screen as with --quick",
+    )
     width, height = QUICK_SIZE
     parser.add_argument(
         "--quick", action="store_true", help=f"fewer settings, repeats and samples; {width}x{height} unless --size"
@@ -98,9 +108,12 @@ def add(commands: argparse._SubParsersAction[Any]) -> None:
         f"(default {REFERENCE_SAMPLES}; {QUICK_REFERENCE_SAMPLES} with --quick)",
     )
     add_frame_flags(parser, detail=False)
+    add_gaze_trace_flags(
+        parser, title="gaze, with --temporal", required=False, seconds=f"{WALK_S:g}, or as long as a shorter file"
+    )
     parser.set_defaults(size=None)
     parser.add_argument("--no-report", action="store_true", help="leave out the page and its plots")
-    parser.add_argument("--json", action="store_true", help="print accuracy.json")
+    parser.add_argument("--json", action="store_true", help="print accuracy.json or temporal.json")
     add_threads(parser)
     add_scenes_folder(parser)
     parser.set_defaults(run=run)
@@ -111,6 +124,8 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.numerics:
         return _numerics(as_json=arguments.json)
     _complete(arguments)
+    if arguments.temporal:
+        return measure_flicker(arguments)
     frame_request(arguments, Camera(), quality=Quality())  # complain about a flag before a scene takes seconds to load
     prepared = load_scene(arguments.scene, arguments.scenes_folder)
     view = frame_request(arguments, prepared.scene.camera, quality=Quality())
@@ -162,7 +177,13 @@ def _complete(arguments: argparse.Namespace) -> None:
         raise UsageError(f"the following arguments are required: {', '.join(missing)}")
     check_threads(arguments.threads)
     display = Display()
-    arguments.size = arguments.size or (QUICK_SIZE if arguments.quick else (display.width_px, display.height_px))
+    small = arguments.quick or arguments.temporal
+    arguments.size = arguments.size or (QUICK_SIZE if small else (display.width_px, display.height_px))
+    if arguments.temporal and arguments.gaze is not None:
+        raise UsageError("--gaze: expected none with --temporal, whose gaze is that of --gaze-trace")
+    if arguments.gaze_trace is not None and not arguments.temporal:
+        raise UsageError("--gaze-trace: expected --temporal with it")
+    arguments.gaze_trace = arguments.gaze_trace or SIMULATED
     if arguments.repeats is None:
         arguments.repeats = QUICK_REPEATS if arguments.quick else REPEATS
     if arguments.reference_samples is None:
@@ -211,7 +232,12 @@ def _report(
 ) -> AccuracyReport:
     from renderer.accuracy.measurement import setting_result
     from renderer.accuracy.record import AccuracyReport
+    from renderer.acuity_comparison import compare_models
+    from renderer.workers import WorkerPool
 
+    pool = WorkerPool(machine.threads)
+    models = compare_models(view.display, view.gaze, view.quality, pool)
+    pool.close()
     scene = prepared.scene
     assert kept.reference is not None
     results = [
@@ -238,6 +264,7 @@ def _report(
         camera=view.camera or scene.camera,
         reference=kept.reference,
         settings=tuple(results),
+        acuity_models=models,
     )
 
 
@@ -248,7 +275,7 @@ def _write(folder: Path, report: AccuracyReport, *, draw: bool) -> list[Path]:
     from renderer.accuracy.table import csv_text
 
     files = [folder / "accuracy.json", folder / "accuracy.csv"]
-    for path, text in zip(files, (report_json(report), csv_text(report)), strict=True):
+    for path, text in zip(files, (report_json(report), csv_text(report.settings)), strict=True):
         write_whole(path, text.encode())
     if draw and can_plot():
         from clients.report.accuracy_report import write_report

@@ -28,12 +28,25 @@ class Playback:
     seconds: float
 
 
-def add_gaze_trace_flags(parser: argparse.ArgumentParser) -> None:
-    """Add `--gaze-trace` and what belongs to it."""
-    gaze = parser.add_argument_group("gaze")
+def add_gaze_trace_flags(
+    parser: argparse.ArgumentParser,
+    *,
+    title: str = "gaze",
+    required: bool = True,
+    seconds: str = f"as long as the file, {DEFAULT_SECONDS:g} for {SIMULATED} gaze",
+) -> None:
+    """Add `--gaze-trace` and what belongs to it.
+
+    Args:
+        parser: of the command.
+        title: of the group of flags.
+        required: whether `--gaze-trace` must be given; None stands for it where it is not.
+        seconds: what the default of `--seconds` is, for people.
+    """
+    gaze = parser.add_argument_group(title)
     gaze.add_argument(
         "--gaze-trace",
-        required=True,
+        required=required,
         metavar="FILE",
         help="CSV with columns t_ms, x_px, y_px and, if you like, valid and event (x_fraction and y_fraction are "
         f"shares of the screen); or the word {SIMULATED}: fixations, saccades and blinks made up",
@@ -42,7 +55,7 @@ def add_gaze_trace_flags(parser: argparse.ArgumentParser) -> None:
         "--seconds",
         type=float,
         metavar="S",
-        help=f"how long it is played (default: as long as the file, {DEFAULT_SECONDS:g} for {SIMULATED} gaze)",
+        help=f"how long it is played (default: {seconds})",
     )
     gaze.add_argument(
         "--trace-size",

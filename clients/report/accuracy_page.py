@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,21 +19,22 @@ accurate. The <b class="dominated">grey</b> ones are beaten by one that is. Choo
 see its picture below.</p>
 <p>No measure sees everything, so look at several: the error where you look says nothing of the rest of the screen, the
 error over the screen counts what the eye cannot resolve far from the gaze, and none of them knows how a frame changes
-when the gaze moves.</p>"""
+when the gaze moves: <code>gazetrace accuracy --temporal</code> measures that.</p>"""
 
 
-def accuracy_page(record: Record, data: dict[str, Any], folder: Path) -> str:
+def accuracy_page(record: Record, data: dict[str, Any], folder: Path, sections: Sequence[str] = ()) -> str:
     """The page as one HTML document that works from disk.
 
     Args:
         record: what accuracy.json holds.
         data: of `page_data`.
         folder: where the record lies, for links to files beside the page.
+        sections: HTML of what else was measured.
     """
     display, gaze, reference = record["display"], record["gaze"], record["reference"]
     error = reference["standard_error"]
     absent = "".join(f"<li>{text(sentence)}</li>" for sentence in missing(record))
-    files = ("accuracy.csv", "accuracy.json", "accuracy.png", "accuracy.svg")
+    files = ("accuracy.csv", "accuracy.json", "accuracy.png", "accuracy.svg", "temporal.csv", "temporal.json")
     links = " · ".join(f'<a href="{name}">{name}</a>' for name in files if (folder / name).exists())
     screen = (
         f"{display['width_px']}x{display['height_px']} pixels, {_centimetres(display)}, "
@@ -60,6 +62,7 @@ def accuracy_page(record: Record, data: dict[str, Any], folder: Path) -> str:
 <h2>All settings</h2>
 <p>A click on a heading sorts; settings on the front of a measure are marked there with a dot.</p>
 {_table(record)}
+{"".join(sections)}
 <h2>Machine and command</h2>
 {machine_facts(dict(record))}
 <p>{links}</p>

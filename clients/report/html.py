@@ -64,6 +64,14 @@ def data_url(path: Path) -> str:
     return f"data:{MEDIA_TYPES[path.suffix.lower()]};base64,{encoded}"
 
 
+def figure(title: str, path: Path, caption: str) -> str:
+    """A picture under a heading, with what it shows below."""
+    return (
+        f'<h2>{text(title)}</h2>\n<figure><img src="{data_url(path)}" alt="{text(title)}">'
+        f"<figcaption>{text(caption)}</figcaption></figure>"
+    )
+
+
 def table(heads: Iterable[str], rows: Iterable[Iterable[str]], caption: str = "") -> str:
     """A table whose first column is text and whose others are numbers; cells are HTML."""
     head = "".join(f'<th scope="col">{cell}</th>' for cell in heads)

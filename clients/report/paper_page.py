@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from clients.report.html import data_url, machine_facts, page, table, text
+from clients.report.html import figure, machine_facts, page, table, text
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +51,7 @@ def paper_page(record: dict[str, Any], figures: Sequence[PaperFigure]) -> str:
             _time_table(time),
             "<h2>What differs from the paper</h2>",
             "<ul>" + "".join(f"<li>{text(sentence)}</li>" for sentence in record["differences"]) + "</ul>",
-            *(_figure(figure) for figure in figures),
+            *(figure(shown.title, shown.file, shown.caption) for shown in figures),
             "<h2>Machine and command</h2>",
             machine_facts(record),
             "</main>",
@@ -99,13 +99,6 @@ def _time_table(time: dict[str, Any]) -> str:
     rows.append([name, "", f"{paper['time_ratio']:.2f}", f"{paper['ray_ratio']:.2f}", "", "", ""])
     heads = ("picture", "time", "time ratio", "ratio of camera rays", "of all rays", "camera rays", "foveal error")
     return table(heads, rows)
-
-
-def _figure(figure: PaperFigure) -> str:
-    return (
-        f'<h2>{text(figure.title)}</h2>\n<figure><img src="{data_url(figure.file)}" alt="{text(figure.title)}">'
-        f"<figcaption>{text(figure.caption)}</figcaption></figure>"
-    )
 
 
 def _millions(count: float) -> str:

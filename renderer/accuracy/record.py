@@ -10,13 +10,17 @@ import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields, is_dataclass
 from types import NoneType, UnionType
-from typing import Any, Final, TypeVar, get_args, get_origin, get_type_hints
+from typing import TYPE_CHECKING, Any, Final, TypeVar, get_args, get_origin, get_type_hints
 
+from renderer.acuity_comparison import ModelCost
 from renderer.camera import Camera
 from renderer.display import Display
 from renderer.frame import RayCounts
 from renderer.gaze import Gaze
 from renderer.quality import Quality
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
 
 GROUPS: Final = (
     "samples", "map", "acuity_scale", "antialiasing", "reconstruction", "shadow_samples", "max_depth", "effects",
@@ -179,6 +183,7 @@ class AccuracyReport:
         display, gaze, camera: what was rendered.
         reference: what the settings are held against.
         settings: the default first.
+        acuity_models: what each costs with the default quality; empty where they were not compared.
     """
 
     version: str
@@ -194,10 +199,11 @@ class AccuracyReport:
     camera: Camera
     reference: Reference
     settings: tuple[SettingResult, ...]
+    acuity_models: tuple[ModelCost, ...] = ()
 
 
-def report_json(report: AccuracyReport) -> str:
-    """The report as accuracy.json holds it.
+def report_json(report: DataclassInstance) -> str:
+    """A record as accuracy.json or temporal.json holds it.
 
     Raises:
         ValueError: for a number that is not finite.

@@ -1,19 +1,24 @@
-"""The settings of a report as a table, for spreadsheets."""
+"""Records as a table, for spreadsheets."""
 
 from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from renderer.accuracy.record import AccuracyReport
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
 
 
-def csv_text(report: AccuracyReport) -> str:
-    """A line for each setting, a column for each field under its dotted name; lists with blanks between, null empty."""
-    rows = [dict(_columns(asdict(setting), "")) for setting in report.settings]
+def csv_text(records: Sequence[DataclassInstance]) -> str:
+    """A line for each record, a column for each field under its dotted name; lists with blanks between, null empty.
+
+    Args:
+        records: one or more, of one class.
+    """
+    rows = [dict(_columns(asdict(record), "")) for record in records]
     text = io.StringIO()
     writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
     writer.writeheader()

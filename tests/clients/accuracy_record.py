@@ -17,6 +17,9 @@ from renderer.accuracy.record import (
     StandardError,
     report_json,
 )
+from renderer.accuracy.temporal import WAYS, Flicker
+from renderer.accuracy.temporal_record import TemporalReport
+from renderer.acuity_comparison import ModelCost
 from renderer.camera import Camera
 from renderer.codec import encode
 from renderer.display import Display
@@ -76,6 +79,13 @@ def record() -> AccuracyReport:
         camera=Camera(),
         reference=Reference(256, StandardError(0.0012, 0.0007), 12.0, "frames/reference.png"),
         settings=tuple(setting(name, *values) for name, values in TIMES_AND_ERRORS.items()),
+        acuity_models=(model("peli", 1200), model("guenter", 300)),
+    )
+
+
+def model(name: str, cells: int) -> ModelCost:
+    return ModelCost(
+        name, f"{name} & others", "f", 40.0, (0.0, 20.0, 40.0), (43.1, 6.0, 3.0), cells, cells / 20_736, 4 * cells
     )
 
 
@@ -96,3 +106,27 @@ def write_measurement(folder: Path, report: AccuracyReport) -> None:
     names = [report.reference.frame, *(name for part in report.settings for name in (part.frame, part.error_map))]
     for name in names:
         (folder / name).write_bytes(encode(random.integers(0, 256, (HEIGHT, WIDTH, 3), dtype=np.uint8), "png"))
+
+
+def write_flicker(folder: Path, scene: str = "atrium") -> None:
+    """temporal.json, of three steps."""
+    ways = (
+        Flicker(way, 3, 2, 1000.0, 0.3, 0.02 / place, None, 0.0, (0.0, 0.02 / place, 0.04 / place))
+        for place, way in enumerate(WAYS, 1)
+    )
+    report = record()
+    temporal = TemporalReport(
+        version=report.version,
+        command="gazetrace accuracy atrium --temporal -o DIR",
+        made=report.made,
+        machine=report.machine,
+        scene=scene,
+        display=report.display,
+        camera=report.camera,
+        quality=Quality(),
+        gaze_trace="<eye>.csv",
+        frames_per_second=25.0,
+        gazes=(report.gaze,) * 4,
+        ways=tuple(ways),
+    )
+    (folder / "temporal.json").write_text(report_json(temporal))

@@ -23,6 +23,7 @@ from clients.command_line.accuracy_folder import LOG, AccuracyFolder
 from clients.command_line.accuracy_text import COLUMNS, accuracy_text, pareto_best
 from clients.command_line.errors import UsageError
 from renderer.accuracy.record import read_report
+from renderer.acuity import MODELS
 from renderer.codec import decode_texture
 from tests.clients.commands import PATIENCE_S, failing, start
 from tests.renderer.accuracy.examples import FAR, NEAR, REPORT
@@ -68,6 +69,12 @@ def test_everything_that_was_found_is_in_the_folder(capsys: pytest.CaptureFixtur
         assert len(setting["time_ms"]["repeats"]) == 2
         assert setting["rays"]["primary"] == pytest.approx(setting["cells"] * setting["samples_per_cell"])
         assert setting["accuracy"]["flip_mean"] is None or 0.0 <= setting["accuracy"]["flip_mean"] <= 1.0
+    models = {cost["model"]: cost for cost in report["acuity_models"]}
+    assert tuple(models) == MODELS
+    for setting in report["settings"]:
+        if setting["group"] == "acuity_model" or "default" in setting["marks"]:
+            cost = models[setting["quality"]["acuity"]["model"]]
+            assert (cost["cells"], cost["camera_rays"]) == (setting["cells"], setting["rays"]["primary"])
     groups = {setting["group"] for setting in report["settings"]}
     assert groups >= {"samples", "map", "acuity_scale", "effects", "max_depth"}
 

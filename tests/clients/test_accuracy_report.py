@@ -18,10 +18,13 @@ from numpy.typing import NDArray
 from clients.report.accuracy_data import front_of, measured, missing
 from clients.report.accuracy_report import write_report
 from clients.report.measures import MEASURES, jod_words
+from clients.report.models_section import model_curves
 from clients.report.pictures import shrink, window_around
 from renderer.accuracy.record import Accuracy, report_json
+from renderer.acuity import Acuity
 from renderer.codec import decode_texture
-from tests.clients.accuracy_record import FRONT, TIMES_AND_ERRORS, record, with_jod, write_measurement
+from renderer.quality import Quality
+from tests.clients.accuracy_record import FRONT, TIMES_AND_ERRORS, record, with_jod, write_flicker, write_measurement
 from tests.service.chromium import Page
 
 MEASURED = ["foveal_rms", "rms", "relative_mse", "foveal_max_error", "foveal_psnr_db", "luminance_ratio"]
@@ -35,6 +38,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     pytest.importorskip("matplotlib", reason="the extra 'report' is not installed")
     folder = tmp_path_factory.mktemp("report") / "here"
     write_measurement(folder, record())
+    write_flicker(folder)
     write_report(folder)
     return Path(shutil.move(folder, folder.with_name("there")))
 
@@ -108,6 +112,22 @@ def test_a_jod_is_told_as_preference(jod: float, share: str, words: str) -> None
     assert not re.search("lossless|invisible|not noticeable", said)
 
 
+def test_a_model_has_the_error_of_the_setting_that_is_the_default_but_for_it() -> None:
+    report = record()
+    names = ["aligned-1", "full-1"]
+    changed = {
+        "aligned-1": {"group": "acuity_model", "quality": Quality(acuity=Acuity("guenter"))},
+        "full-1": {"group": "map", "quality": Quality(map="full", acuity=Acuity("guenter"))},
+    }
+    settings = tuple(replace(each, **changed.get(each.id, {})) for each in reversed(report.settings))  # type: ignore[arg-type]
+    assert {each.id for each in settings} >= set(names)
+    peli, guenter = model_curves(json.loads(report_json(replace(report, settings=settings))))
+    assert (peli.name, peli.rms, peli.foveal_rms) == ("peli", TIMES_AND_ERRORS["aligned-4"][1], 0.02)
+    assert (guenter.name, guenter.rms, guenter.camera_rays) == ("guenter", TIMES_AND_ERRORS["aligned-1"][1], 1200)
+    _, unmeasured = model_curves(json.loads(report_json(report)))
+    assert (unmeasured.rms, unmeasured.foveal_rms) == (None, None)
+
+
 # Pictures
 
 
@@ -141,7 +161,7 @@ def test_a_window_lies_on_the_screen(x: float, y: float, width: int, height: int
 
 
 def test_every_measure_has_a_plot_as_png_and_svg(made: Path) -> None:
-    stems = ["accuracy", *(f"accuracy-{key.replace('_', '-')}" for key in MEASURED)]
+    stems = ["accuracy", "acuity-models", "temporal", *(f"accuracy-{key.replace('_', '-')}" for key in MEASURED)]
     for stem in stems:
         assert decode_texture((made / f"{stem}.png").read_bytes(), stem).pixels.std() > 5
         assert (made / f"{stem}.svg").read_text().count("<svg") == 1
@@ -261,3 +281,35 @@ def test_the_words_say_what_was_measured_where_and_what_is_missing(made: Path, p
         "numpy 2.4", "256 rays a pixel", "0.0012", "flip-evaluator", "pyfvvdp", "4,000 primary, 300 shadow",
     ):  # fmt: skip
         assert expected in words
+
+
+@pytest.mark.browser
+def test_models_and_flicker_are_sections_of_the_page(made: Path, page: Page) -> None:
+    page.open((made / "report.html").as_uri(), 1366, 768)
+    page.wait_for(DRAWN)
+    headings = page.evaluate("[...document.querySelectorAll('h2')].map((heading) => heading.textContent)")
+    assert headings[3:5] == ["Acuity models", "What flickers when only the gaze moves"]
+    tables = "[...document.querySelectorAll('table')].slice(1).map((table) => [...table.tBodies[0].rows].map((row) => "
+    models, ways = page.evaluate(tables + "[...row.cells].map((cell) => cell.innerText.split('\\n')[0])))")
+    assert models == [
+        ["peli", "40°", "1,200", "5.8 %", "4,800", "30.0", "0.02", "0.04"],
+        ["guenter", "40°", "300", "1.4 %", "1,200", "–", "–", "–"],
+    ]
+    assert [way[:4] for way in ways] == [
+        ["scanline", "20.000", "–", "40.000"],
+        ["aligned", "10.000", "–", "20.000"],
+        ["aligned with hysteresis", "6.667", "–", "13.333"],
+    ]
+    pictures = page.evaluate("[...document.querySelectorAll('main > figure > img')].map((image) => image.naturalWidth)")
+    assert len(pictures) == 2
+    assert min(pictures) > 1000
+    assert "(<eye>.csv)" in page.evaluate("document.body.innerText")
+    assert page.complaints() == []
+
+
+def test_flicker_of_another_scene_is_no_section(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib", reason="the extra 'report' is not installed")
+    write_measurement(tmp_path / "found", record())
+    write_flicker(tmp_path / "found", "spheres")
+    write_report(tmp_path / "found")
+    assert "What flickers" not in (tmp_path / "found" / "report.html").read_text()

@@ -13,6 +13,7 @@ from renderer.accuracy.record import (
     StandardError,
 )
 from renderer.acuity import Acuity
+from renderer.acuity_comparison import ModelCost
 from renderer.camera import Camera
 from renderer.display import Display
 from renderer.frame import RayCounts
@@ -67,4 +68,5 @@ REPORT = AccuracyReport(
     camera=Camera(),
     reference=Reference(256, StandardError(0.002, None), 12.5, "frames/reference.png"),
     settings=(NEAR, FAR),
+    acuity_models=(ModelCost("peli", "a paper", "f = 1", 60.0, (0.0, 30.0), (43.1, 4.1), 2000, 0.87, 8000),),
 )

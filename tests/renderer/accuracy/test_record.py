@@ -24,7 +24,7 @@ def test_the_file_has_the_fields_that_its_readers_rely_on() -> None:
     values = json.loads(report_json(REPORT))
     assert list(values) == [
         "version", "command", "made", "machine", "scene", "triangles", "spheres", "effects", "display", "gaze",
-        "camera", "reference", "settings",
+        "camera", "reference", "settings", "acuity_models",
     ]  # fmt: skip
     assert values["machine"]["packages"] == {"numpy": "2.4.6"}
     assert values["gaze"] == {"x": -20.0, "y": 18.5}
@@ -79,7 +79,7 @@ def test_settings_of_a_file_are_in_range() -> None:
 
 
 def test_the_table_has_a_line_for_each_setting() -> None:
-    near, far = csv.DictReader(io.StringIO(csv_text(REPORT)))
+    near, far = csv.DictReader(io.StringIO(csv_text(REPORT.settings)))
     assert (near["id"], near["label"], near["marks"]) == ("aligned-4", "aligned, 4 samples", "default")
     assert (near["time_ms.median"], near["time_ms.repeats"]) == ("20.0", "31.0 18.5 20.0")
     assert (near["accuracy.jod"], far["accuracy.jod"]) == ("9.7", "")

@@ -1,0 +1,115 @@
+"""`gazetrace accuracy --temporal`: what changes on the screen when only the gaze moves, measured and written down."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import shlex
+from datetime import UTC, datetime
+from importlib import metadata
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from clients.command_line.errors import OK, UsageError
+from clients.command_line.frame_flags import frame_request
+from clients.command_line.gaze_trace_flags import playback_of
+from clients.command_line.progress import counting
+from clients.command_line.render import ready_renderer, write_whole
+from clients.command_line.scene_argument import load_scene
+from clients.command_line.temporal_text import temporal_text
+from renderer.camera import Camera
+from renderer.gaze import Gaze
+from renderer.quality import Quality
+
+if TYPE_CHECKING:
+    from renderer.accuracy.temporal_record import TemporalReport
+    from renderer.display import Display
+    from renderer.frame import FrameRequest
+    from renderer.prepared import PreparedScene
+
+WALK_S: Final = 2.0
+"""How long the gaze is played unless told [s]."""
+
+FRAMES_PER_SECOND: Final = 25.0
+
+MOST_GAZES: Final = 10_000
+
+
+def measure_flicker(arguments: argparse.Namespace) -> int:
+    """Render the walk in each way, write what changed, print it; with a page where one measures the scene already."""
+    view = frame_request(arguments, Camera(), quality=Quality())
+    walk = walk_of(arguments, view.display)
+    prepared = load_scene(arguments.scene, arguments.scenes_folder)
+    view = frame_request(arguments, prepared.scene.camera, quality=Quality())
+    report = _measured(arguments, prepared, view, walk)
+    from renderer.accuracy.record import report_json
+    from renderer.accuracy.table import csv_text
+
+    folder: Path = arguments.output
+    folder.mkdir(exist_ok=True)
+    files = [folder / "temporal.json", folder / "temporal.csv"]
+    for path, text in zip(files, (report_json(report), csv_text(report.ways)), strict=True):
+        write_whole(path, text.encode())
+    if not arguments.no_report:
+        files = [*_draw(folder), *files]
+    print(report_json(report) if arguments.json else temporal_text(report, files))
+    return OK
+
+
+def walk_of(arguments: argparse.Namespace, display: Display) -> list[Gaze]:
+    """The newest gaze at the time of each frame; where the eye was lost, the last one.
+
+    Raises:
+        UsageError: for a walk without a step, or too long a one.
+    """
+    playback = playback_of(arguments)
+    seconds = min(playback.seconds, WALK_S) if arguments.seconds is None else playback.seconds
+    count = math.ceil(round(seconds * FRAMES_PER_SECOND, 6))
+    if not 2 <= count <= MOST_GAZES:
+        found = f"{count} in {seconds:g} s at {FRAMES_PER_SECOND:g} a second"
+        raise UsageError(f"--seconds: expected time for 2 to {MOST_GAZES} gazes, found {found}")
+    trace = playback.trace.held((display.width_px / 2, display.height_px / 2))
+    samples = (trace.sample(trace.newest(frame / FRAMES_PER_SECOND)) for frame in range(count))
+    return [Gaze(sample.x, sample.y) for sample in samples]
+
+
+def _measured(
+    arguments: argparse.Namespace, prepared: PreparedScene, view: FrameRequest, walk: list[Gaze]
+) -> TemporalReport:
+    from renderer.accuracy.machine import this_machine
+    from renderer.accuracy.temporal import WAYS, flicker
+    from renderer.accuracy.temporal_record import TemporalReport
+
+    renderer = ready_renderer(arguments.threads)
+    ways = []
+    with counting(f"moving the gaze over {arguments.scene}", len(WAYS) * len(walk)) as tick:
+        for way in WAYS:
+            ways.append(flicker(renderer, prepared, view, walk, way, tick))
+            renderer.forget_samples()
+    renderer.close()
+    return TemporalReport(
+        version=metadata.version("gazetrace"),
+        command=shlex.join(["gazetrace", *arguments.words]),
+        made=datetime.now(UTC).isoformat(timespec="seconds"),
+        machine=this_machine(renderer.threads),
+        scene=arguments.scene,
+        display=view.display,
+        camera=view.camera or prepared.scene.camera,
+        quality=view.quality,
+        gaze_trace=arguments.gaze_trace,
+        frames_per_second=FRAMES_PER_SECOND,
+        gazes=tuple(walk),
+        ways=tuple(ways),
+    )
+
+
+def _draw(folder: Path) -> list[Path]:
+    """Make the page of the measurement in the folder again, if it has one that can be drawn; the page."""
+    from clients.report.plotting import can_plot
+
+    if not can_plot() or not (folder / "accuracy.json").is_file():
+        return []
+    from clients.report.accuracy_report import write_report
+
+    page, *_ = write_report(folder)
+    return [page]
