@@ -6,14 +6,28 @@ import os
 import re
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 
 from clients.command_line.errors import CommandFailed
 from clients.command_line.progress import working
 
 PACKAGES = Path(__file__).parents[2]
+
+
+@dataclass(frozen=True, slots=True)
+class OwnService:
+    """A service that runs.
+
+    Attributes:
+        url: where it listens.
+        process: its number.
+    """
+
+    url: str
+    process: int
 
 
 @contextmanager
@@ -26,12 +40,28 @@ def own_service(flags: Sequence[str]) -> Iterator[str]:
     Raises:
         CommandFailed: if it did not come up; it has said why on stderr.
     """
+    with own_service_process(flags, {}) as service:
+        yield service.url
+
+
+@contextmanager
+def own_service_process(flags: Sequence[str], variables: Mapping[str, str]) -> Iterator[OwnService]:
+    """The same with its process.
+
+    Args:
+        flags: more flags of `gazetrace serve`.
+        variables: of its environment, beside those of ours.
+
+    Raises:
+        CommandFailed: if it did not come up; it has said why on stderr.
+    """
     environ = {name: value for name, value in os.environ.items() if not name.startswith("GAZETRACE_")}
     environ["PYTHONPATH"] = os.pathsep.join(filter(None, (str(PACKAGES), environ.get("PYTHONPATH"))))
+    environ |= variables
     words = [sys.executable, "-P", "-m", "clients.command_line", "serve", "--port", "0", *flags]
     with subprocess.Popen(words, env=environ, stdout=subprocess.PIPE, text=True) as process:
         try:
-            yield _address(process)
+            yield OwnService(_address(process), process.pid)
         finally:
             process.terminate()
 

@@ -19,6 +19,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from clients.command_line.peers.mitsuba_scene import has_mitsuba, mitsuba_scene
 from renderer.display import Display
 from renderer.frame import FrameRequest
 from renderer.gaze import Gaze
@@ -27,7 +28,7 @@ from renderer.prepared import prepare
 from renderer.quality import Quality
 from renderer.scene import Scene
 from tests.agreement.comparison import assert_consistent, assert_equal_light, require
-from tests.agreement.mitsuba_peer import followed_picture, has_mitsuba, mitsuba_scene, repeated_pictures
+from tests.agreement.mitsuba_peer import followed_picture, repeated_pictures
 from tests.agreement.scenes import (
     bubble,
     glass_scene,

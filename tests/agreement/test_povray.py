@@ -26,11 +26,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from clients.command_line.peers.povray import STEP, find_povray, povray_picture, read_ppm
 from renderer.display import Display
 from renderer.pipeline import Renderer
 from renderer.scene import Scene
 from tests.agreement.comparison import assert_equal_light, require
-from tests.agreement.povray import STEP, find_povray, povray_picture, read_ppm
 from tests.agreement.scenes import glass_scene, mirror_scene, phong_scene
 from tests.renderer.drawing import shoot
 

@@ -6,7 +6,9 @@ import os
 import re
 import shutil
 import subprocess
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,12 +17,19 @@ from renderer.camera import view_frame
 from renderer.display import Display
 from renderer.scene import Material, Mesh, PointLight, Scene, Sphere
 
-PATIENCE_S = 60
+PATIENCE_S: Final = 600
+"""Longest that a picture may take [s]."""
 
-NEAR_M = 0.001
+TRACE_TIME: Final = re.compile(r"Trace Time:.*?\(([\d.]+) seconds\)")
+"""Where it says how long tracing took, without reading the scene [s]."""
+
+NEAR_M: Final = 0.001
 """`fade_distance` D: POV-Ray's light is 2/(1 + (d/D)^2), which is 2 D^2/d^2 but for 1e-6 of (1 m / d)^2."""
 
-STEP = 1.0 / 65535
+VISIBLE: Final = 1.0 / 255
+"""Weight below which a ray cannot change a picture of 8 bits."""
+
+STEP: Final = 1.0 / 65535
 """Between two codes of its 16-bit picture, the finest it writes: half floats are 30 times coarser near 1."""
 
 
@@ -41,17 +50,47 @@ def povray_picture(scene: Scene, display: Display, depth: int, folder: Path) -> 
     Returns:
         (h, w, 3) float64 linear radiance in steps of 1/65535.
     """
+    _run(scene, display, depth, folder, ("+Otheirs.ppm", "+FP16", "File_Gamma=1.0", "Dither=off", "+WT1"))
+    return read_ppm((folder / "theirs.ppm").read_bytes())
+
+
+def povray_trace_s(scene: Scene, display: Display, depth: int, threads: int, folder: Path) -> float:
+    """How long it takes to trace the same picture on `threads` threads, without reading the scene or writing it [s].
+
+    Args:
+        scene, display, depth, folder: as in `povray_picture`; rays too weak to be seen in 8 bits are left out.
+        threads: to trace on.
+    """
+    said = _run(scene, display, depth, folder, ("-F", f"+WT{threads}"), weakest=VISIBLE)
+    found = TRACE_TIME.search(said)
+    if found is None:
+        raise ValueError(f"POV-Ray: expected a line 'Trace Time: ... (N seconds)', found {said[-200:]!r}")
+    return float(found[1])
+
+
+def _run(scene: Scene, display: Display, depth: int, folder: Path, options: Sequence[str], weakest: float = 0.0) -> str:
+    """Make one picture; what the program says about it.
+
+    Raises:
+        FileNotFoundError: if it is not installed.
+        subprocess.CalledProcessError: if it fails.
+    """
     program = find_povray()
-    assert program is not None
-    (folder / "scene.pov").write_text(povray_source(scene, display, depth))
+    if program is None:
+        raise FileNotFoundError("expected the program povray, found none")
+    (folder / "scene.pov").write_text(povray_source(scene, display, depth, weakest))
     size = (f"+W{display.width_px}", f"+H{display.height_px}")
-    options = ("+Iscene.pov", "+Otheirs.ppm", *size, "+FP16", "File_Gamma=1.0", "Dither=off", "-A", "-D", "+WT1")
     environ = {**os.environ, "HOME": str(folder)}
     done = subprocess.run(
-        (program, *options), cwd=folder, env=environ, capture_output=True, text=True, timeout=PATIENCE_S, check=False
+        (program, "+Iscene.pov", *size, "-A", "-D", *options),
+        cwd=folder,
+        env=environ,
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE_S,
+        check=True,
     )
-    assert done.returncode == 0, done.stderr
-    return read_ppm((folder / "theirs.ppm").read_bytes())
+    return done.stderr
 
 
 def read_ppm(content: bytes) -> NDArray[np.float64]:
@@ -62,15 +101,20 @@ def read_ppm(content: bytes) -> NDArray[np.float64]:
     return np.frombuffer(content, ">u2", offset=head.end()).reshape(height, width, 3) / float(largest)
 
 
-def povray_source(scene: Scene, display: Display, depth: int) -> str:
-    """The scene in POV-Ray's language: our vectors as they are, since its camera states its own axes."""
+def povray_source(scene: Scene, display: Display, depth: int, weakest: float = 0.0) -> str:
+    """The scene in POV-Ray's language: our vectors as they are, since its camera states its own axes.
+
+    Args:
+        scene, display, depth: as in `povray_picture`.
+        weakest: weight below which a ray is not followed.
+    """
     view = view_frame(scene.camera, display)
     width, height = display.width_px * view.step_x, -display.height_px * view.step_y
     middle = view.corner + width / 2 - height / 2
     around = scene.surroundings
     parts = [
         "#version 3.7;",
-        f"global_settings {{ assumed_gamma 1.0 adc_bailout 0 max_trace_level {depth + 1} "
+        f"global_settings {{ assumed_gamma 1.0 adc_bailout {weakest!r} max_trace_level {depth + 1} "
         f"ambient_light rgb {_vector(around.ambient)} }}",
         f"camera {{ perspective location {_vector(scene.camera.position)} direction {_vector(middle)} "
         f"right {_vector(width)} up {_vector(height)} }}",

@@ -1,0 +1,1 @@
+"""Other renderers, given our own scenes: for the benchmark, and for the tests that hold our pictures against theirs."""
