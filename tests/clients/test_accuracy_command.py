@@ -69,14 +69,24 @@ def test_everything_that_was_found_is_in_the_folder(capsys: pytest.CaptureFixtur
         assert len(setting["time_ms"]["repeats"]) == 2
         assert setting["rays"]["primary"] == pytest.approx(setting["cells"] * setting["samples_per_cell"])
         assert setting["accuracy"]["flip_mean"] is None or 0.0 <= setting["accuracy"]["flip_mean"] <= 1.0
-    models = {cost["model"]: cost for cost in report["acuity_models"]}
-    assert tuple(models) == MODELS
-    for setting in report["settings"]:
-        if setting["group"] == "acuity_model" or "default" in setting["marks"]:
-            cost = models[setting["quality"]["acuity"]["model"]]
-            assert (cost["cells"], cost["camera_rays"]) == (setting["cells"], setting["rays"]["primary"])
     groups = {setting["group"] for setting in report["settings"]}
     assert groups >= {"samples", "map", "acuity_scale", "effects", "max_depth"}
+
+
+def test_each_acuity_model_costs_what_its_setting_does(capsys: pytest.CaptureFixture[str]) -> None:
+    """The gaze is off a screen so fine that cells are wider than pixels."""
+    words = ("--screen-cm", "1.3x0.8", "--gaze=-600,20", "--repeats", "1", "-o", "found")
+    report = measured(capsys, "matte", *TINY, *words)
+    models = {cost["model"]: cost for cost in report["acuity_models"]}
+    assert tuple(models) == MODELS
+    compared = [
+        setting for setting in report["settings"] if setting["group"] == "acuity_model" or "default" in setting["marks"]
+    ]
+    assert len(compared) == 3
+    for setting in compared:
+        cost = models[setting["quality"]["acuity"]["model"]]
+        assert (cost["cells"], cost["camera_rays"]) == (setting["cells"], setting["rays"]["primary"])
+        assert cost["cells"] < 48 * 27
 
 
 def test_each_picture_is_the_frame_that_render_makes(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
