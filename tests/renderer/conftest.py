@@ -5,13 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
-from hypothesis import settings
 
 from renderer.pipeline import Renderer
 from renderer.workers import WorkerPool
-
-settings.register_profile("kernels", deadline=None)  # the first example of a test may compile kernels
-settings.load_profile("kernels")
 
 
 @pytest.fixture(scope="session")

@@ -135,7 +135,7 @@ def test_after_a_restart_nothing_of_the_past_counts() -> None:
     assert clock.map(5.0, START + 1) == (5 * MILLISECOND_NS, START + 1)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(st.lists(st.integers(-(10**6), 10**6), min_size=1, max_size=30))
 def test_the_lower_hull_lies_below_all_points_and_is_convex(heights: list[int]) -> None:
     points = [(3 * i, y) for i, y in enumerate(heights)]

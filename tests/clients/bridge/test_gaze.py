@@ -122,7 +122,6 @@ def test_the_first_gaze_counts_at_once() -> None:
     assert run(path(), [HERE])[0].valid
 
 
-@settings(deadline=None)
 @given(
     x=st.floats(allow_nan=True, allow_infinity=True),
     y=st.floats(allow_nan=True, allow_infinity=True),
@@ -285,7 +284,7 @@ def test_the_newest_gaze_replaces_the_one_that_waits() -> None:
     assert [item.seq for item in slot.take(0)] == [199]
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(st.lists(st.tuples(st.booleans(), st.booleans()), max_size=60))
 def test_no_change_is_ever_lost_and_little_waits(steps: list[tuple[bool, bool]]) -> None:
     """Each step brings a gaze; some are followed by a send. What was sent changes as often as what was put."""

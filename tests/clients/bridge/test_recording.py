@@ -81,7 +81,7 @@ def test_after_a_crash_everything_up_to_the_last_whole_chunk_is_there(tmp_path: 
         assert recording.torn == size - ends[count]
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(where=st.integers(0, 10_000), flip=st.integers(1, 255))
 def test_a_damaged_chunk_is_never_played(tmp_path_factory: pytest.TempPathFactory, where: int, flip: int) -> None:
     path = tmp_path_factory.mktemp("damaged") / "a.rec"

@@ -48,7 +48,7 @@ def test_samples_do_not_depend_on_how_the_stream_is_cut(name: str) -> None:
         assert decode(CODECS[name](), [stream[i : i + size] for i in range(0, len(stream), size)]) == samples
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(name=st.sampled_from(list(CODECS)), cuts=st.lists(st.integers(0, 5000), max_size=20))
 def test_samples_do_not_depend_on_any_cuts(name: str, cuts: list[int]) -> None:
     stream, samples = whole(name)
@@ -66,7 +66,7 @@ def test_one_damaged_byte_costs_at_most_two_samples_and_invents_none(name: str, 
         check_damage(name, samples, damaged(stream, kind, position, int(byte)))
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(
     name=st.sampled_from(list(CODECS)),
     kind=st.sampled_from(["insert", "delete", "flip"]),
