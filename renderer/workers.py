@@ -75,12 +75,12 @@ class WorkerPool:
         if count == 0:
             return
         job = _Job(task, count, abandon)
-        with self._changed:
-            if self._closed:
-                raise RuntimeError("the worker pool is closed")
-            self._jobs.append(job)
-            self._changed.notify_all()
         try:
+            with self._changed:
+                if self._closed:
+                    raise RuntimeError("the worker pool is closed")
+                self._jobs.append(job)
+                self._changed.notify_all()
             job.done.wait()
         except BaseException as interruption:  # blocks still running when the process ends would bring it down
             with self._changed:
