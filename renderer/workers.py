@@ -14,6 +14,9 @@ from typing import Protocol
 
 from renderer.frame import Abandoned
 
+GLANCE_S = 0.25
+"""How often whoever waits for a job looks up [s]: Ctrl-C in the moment before a wait is noticed when that ends."""
+
 
 class Workers(Protocol):
     """Whoever runs the blocks of a job."""
@@ -81,7 +84,8 @@ class WorkerPool:
                     raise RuntimeError("the worker pool is closed")
                 self._jobs.append(job)
                 self._changed.notify_all()
-            job.done.wait()
+            while not job.done.wait(GLANCE_S):
+                pass
         except BaseException as interruption:  # blocks still running when the process ends would bring it down
             with self._changed:
                 if job in self._jobs:
