@@ -37,14 +37,8 @@ examples:
   gazetrace bench --only frame,peers --repeats 15 -o bench.json
       Some rows, timed more often, and saved.
 
-  gazetrace bench --all
-      32 samples where there are many, and the memory of 1,000 frames.
-
   gazetrace bench --growth growth
       Time against pixels, triangles, lights and depth, with fitted exponents.
-
-  gazetrace bench --start
-      The first frame of a new process, an idle service, a large file.
 
   gazetrace bench gallery --effect-costs
       What each effect costs: the frame as planned, with every effect on, and without each."""
