@@ -55,10 +55,7 @@ examples:
       What flickers when only the gaze moves, for a recorded eye, in a minute; a section of the page in the same DIR.
 
   gazetrace accuracy --numerics
-      What numerical care costs and what it saves: robust or fast, float64 or float32, and more, in a minute.
-
-  gazetrace accuracy my-scenes/vase --size 2560x1440 --screen-cm 60 --repeats 9 --json -o vase
-      Another scene and screen, timed more often, as JSON on standard output too."""
+      What numerical care costs and what it saves: robust or fast, float64 or float32, and more, in a minute."""
 
 MOST_REPEATS: Final = 1000
 REPEATS: Final = 5

@@ -22,7 +22,7 @@ from tests.clients.commands import PATIENCE_S, SMALL, failing, help_of, start
 
 pytestmark = pytest.mark.usefixtures("plain_environment")
 
-COMMANDS = ("serve", "render", "scenes", "bench", "animate", "watch", "bridge")
+COMMANDS = ("serve", "render", "scenes", "accuracy", "figures", "bench", "animate", "watch", "bridge")
 RENDER = ("render", "spheres", "-o", "a.png")
 
 
