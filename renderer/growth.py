@@ -1,4 +1,4 @@
-"""The samples that the cells of a frame still lack, and tracing them."""
+"""The samples that the cells of a frame still lack, and having them traced."""
 
 from __future__ import annotations
 
@@ -13,8 +13,9 @@ from renderer.cellmap import CellMap
 from renderer.frame import RayCounts, RejectedSamples
 from renderer.prepared import PreparedScene
 from renderer.quality import Quality
-from renderer.store import FIRST_ROUND, SampleStore, add_samples, missing_cells
-from renderer.whitted import Cells, View, block_rays, trace_cells
+from renderer.store import FIRST_ROUND, SampleStore, missing_cells
+from renderer.tracing import Lack, Tracing, total_rays
+from renderer.whitted import View
 from renderer.workers import Workers
 
 
@@ -43,15 +44,15 @@ class Growth(NamedTuple):
 
 
 class _Tracer:
-    """Traces samples of cells and counts what that takes."""
+    """Has samples of cells traced and counts what that takes."""
 
     def __init__(
-        self, prepared: PreparedScene, view: View, store: SampleStore, quality: Quality, pool: Workers
+        self, prepared: PreparedScene, view: View, store: SampleStore, quality: Quality, pool: Workers, tracing: Tracing
     ) -> None:
-        self._scene = (prepared, view)
+        self._scene = (prepared, view, quality)
         self._store = store
-        self._quality = quality
         self._pool = pool
+        self._tracing = tracing
         self.samples = 0
         self.trace_ns = 0
         self.rejected = np.zeros(3, dtype=np.int64)
@@ -61,25 +62,15 @@ class _Tracer:
         self, squares: Squares, chosen: NDArray[np.int32], first: NDArray[np.int32], until: NDArray[np.int32]
     ) -> int:
         """Trace samples first .. until - 1 of each of the `chosen` squares; return how many these are."""
-        prepared, view = self._scene
-        samples, spread, white = self._store.samples, self._store.spread, self._store.white
-        starts = block_starts(until - first, block_rays(prepared, self._quality))
-        counts = [RayCounts()] * (len(starts) - 1)
-        rejected = np.zeros((len(starts) - 1, 3), dtype=np.int64)
-
-        def trace_block(block: int) -> None:
-            part = slice(starts[block], starts[block + 1])
-            some = Cells(squares.x, squares.y, squares.side, chosen[part], first[part], until[part])
-            radiance, counts[block] = trace_cells(prepared, view, some, self._quality)
-            rejected[block] = add_samples(samples, spread, white, squares.slots, some.chosen, some.until, radiance)
-
-        began = time.perf_counter_ns()
-        self._pool.run(trace_block, len(counts))
-        self.trace_ns += time.perf_counter_ns() - began
         traced = int((until - first).sum())
+        if traced == 0:
+            return 0
+        began = time.perf_counter_ns()
+        found = self._tracing.trace(Lack(*self._scene, squares, chosen, first, until), self._store, self._pool)
+        self.trace_ns += time.perf_counter_ns() - began
         self.samples += traced
-        self.rays = total_rays([self.rays, *counts])
-        self.rejected += rejected.sum(axis=0)
+        self.rays = total_rays([self.rays, found.rays])
+        self.rejected += found.rejected
         return traced
 
 
@@ -92,6 +83,7 @@ def grow(
     quality: Quality,
     wanted: int,
     pool: Workers,
+    tracing: Tracing,
 ) -> Growth:
     """Trace what the cells of a map lack of `wanted` samples each, and add it to `store`.
 
@@ -102,13 +94,14 @@ def grow(
         quality: samples a cell gets in the end, antialiasing and depth.
         wanted: samples a cell is to have now; `adaptive` lets it settle for less.
         pool: threads; what is added does not depend on their number.
+        tracing: what traces; what is added does not depend on it either.
 
     Raises:
         Abandoned: if the pool's jobs end early.
     """
     chosen, first, held, fewest = missing_cells(store, slots, wanted, pool)
     asked = wanted * len(chosen) - int(first.sum())
-    tracer = _Tracer(prepared, view, store, quality, pool)
+    tracer = _Tracer(prepared, view, store, quality, pool, tracing)
     squares = Squares(cell_map.x, cell_map.y, cell_map.side, slots)
     if quality.antialiasing == "adaptive":
         verdicts = Verdicts(cell_map, slots, store, prepared.scene.exposure, pool)
@@ -151,32 +144,3 @@ def _trace_rounds(
         traced += tracer.trace(squares, chosen, first[going_on], until[going_on])
         got[chosen] = True
     return int(got.sum()), traced
-
-
-def block_starts(samples: NDArray[np.int32], block: int) -> list[int]:
-    """Where to cut a row of cells into blocks of at most `block` samples, or of a single cell of more.
-
-    Args:
-        samples: (c,) int32 samples of each cell, 1 or more.
-        block: most samples of a block.
-
-    Returns:
-        the first cell of each block, and c.
-    """
-    ends = np.cumsum(samples, dtype=np.int64)
-    starts = [0]
-    while starts[-1] < len(samples):
-        start = starts[-1]
-        before = int(ends[start - 1]) if start else 0
-        starts.append(max(start + 1, int(np.searchsorted(ends, before + block, side="right"))))
-    return starts
-
-
-def total_rays(counts: list[RayCounts]) -> RayCounts:
-    """The sum of several counts."""
-    return RayCounts(
-        primary=sum(count.primary for count in counts),
-        shadow=sum(count.shadow for count in counts),
-        reflection=sum(count.reflection for count in counts),
-        refraction=sum(count.refraction for count in counts),
-    )

@@ -23,6 +23,7 @@ from renderer.reconstruction import reconstruct
 from renderer.refinement import refine
 from renderer.smooth import reconstruct_smooth
 from renderer.standard_error import StatedError, stated_error
+from renderer.tracing import ThreadTracing, Tracing
 from renderer.warmup import every_effect
 from renderer.whitted import view_of
 from renderer.workers import WorkerPool
@@ -43,12 +44,21 @@ class Renderer:
         threads: int | None = None,
         map_cache_bytes: int = DEFAULT_MAP_CACHE_BYTES,
         store_bytes: int = DEFAULT_STORE_BYTES,
+        tracing: Tracing | None = None,
     ) -> None:
+        """Start the threads.
+
+        Args:
+            threads: how many; None for all cores.
+            map_cache_bytes, store_bytes: room for cell maps and for samples.
+            tracing: what traces samples; None for the threads.
+        """
         keep_freed_memory()
         self._memory = Memory(map_cache_bytes, store_bytes)
         self.map_cache = self._memory.maps
         self.store_cache = self._memory.stores
         self._pool = WorkerPool(threads)
+        self._tracing = tracing or ThreadTracing()
         self._pace = Pace(self._pool.threads)
 
     @property
@@ -88,6 +98,11 @@ class Renderer:
         Raises:
             Abandoned: within about a block of rays after `abandon` is set. What was traced by then is kept.
         """
+        return self._render(prepared, request, abandon, self._tracing)
+
+    def _render(
+        self, prepared: PreparedScene, request: FrameRequest, abandon: threading.Event | None, tracing: Tracing
+    ) -> Frame:
         began = time.perf_counter_ns()
         prepared = with_effects(prepared, request.quality.effects)
         pool = self._pool.until(abandon)
@@ -104,7 +119,7 @@ class Renderer:
             entered = time.perf_counter_ns()
 
             def grow_to(samples_each: int) -> Growth:
-                return grow(prepared, view, cells, slots, store, quality, samples_each, pool)
+                return grow(prepared, view, cells, slots, store, quality, samples_each, pool, tracing)
 
             def judge() -> StatedError:
                 return stated_error(request.display, request.gaze, cells, slots, samples, prepared.scene.exposure, pool)
@@ -149,17 +164,17 @@ class Renderer:
         return Frame(pixels, cost)
 
     def warm_up(self) -> None:
-        """Compile every kernel, or load it from disk, by rendering tiny frames that call for all of them.
+        """Compile every kernel, or load it from disk, by rendering tiny frames that call for all of them here.
 
         Takes tens of seconds the first time on a machine, a second or two afterwards.
         """
-        display = Display(48, 32)
+        display, here = Display(48, 32), ThreadTracing()
         scene = prepare(every_effect())
         for kind in MAPS:
             for linear in (False, True):
                 for reconstruction in RECONSTRUCTIONS:
                     quality = Quality(map=kind, samples_per_cell=2, reconstruction=reconstruction)
-                    self.render(scene, FrameRequest(Gaze(1e4, 16.0), display, None, quality, linear))
+                    self._render(scene, FrameRequest(Gaze(1e4, 16.0), display, None, quality, linear), None, here)
         tabulated = Acuity(model="watson")
         for quality in (
             Quality(deadline_ms=1.0),
@@ -168,6 +183,6 @@ class Renderer:
             Quality(map="scanline", acuity=tabulated),
             Quality(antialiasing="adaptive", samples_per_cell=8),
         ):
-            self.render(scene, FrameRequest(Gaze(0.0, 0.0), display, None, quality))
+            self._render(scene, FrameRequest(Gaze(0.0, 0.0), display, None, quality), None, here)
         eccentricity_deg(display, Gaze(0.0, 0.0))
         self._pace = Pace(self.threads)

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
-from renderer.growth import Growth, total_rays
+from renderer.growth import Growth
 from renderer.quality import MAX_SAMPLES
 from renderer.standard_error import StatedError
+from renderer.tracing import total_rays
 
 CERTAIN_SHARE = 0.9
 """Share of the samples that the error so far calls for which are traced before the error is looked at again."""

@@ -10,7 +10,7 @@ import os
 import threading
 from collections import deque
 from collections.abc import Callable
-from typing import Protocol
+from typing import Final, Protocol
 
 from renderer.frame import Abandoned
 
@@ -20,6 +20,10 @@ GLANCE_S = 0.25
 
 class Workers(Protocol):
     """Whoever runs the blocks of a job."""
+
+    @property
+    def abandon(self) -> threading.Event | None:
+        """Once it is set, what was begun is given up; None for never."""
 
     def run(self, task: Callable[[int], None], count: int) -> None:
         """Call `task(0)` .. `task(count - 1)` and return when all have finished."""
@@ -47,6 +51,8 @@ class _Job:
 
 class WorkerPool:
     """A fixed number of threads that run the blocks of jobs, one block of each job in turn."""
+
+    abandon: Final = None
 
     def __init__(self, threads: int | None = None) -> None:
         self.threads = threads if threads is not None else available_cores()
@@ -158,10 +164,10 @@ class _WorkersUntil:
 
     def __init__(self, pool: WorkerPool, abandon: threading.Event) -> None:
         self._pool = pool
-        self._abandon = abandon
+        self.abandon = abandon
 
     def run(self, task: Callable[[int], None], count: int) -> None:
-        self._pool.run(task, count, self._abandon)
+        self._pool.run(task, count, self.abandon)
 
 
 def available_cores() -> int:

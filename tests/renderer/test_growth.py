@@ -19,12 +19,12 @@ from renderer.display import Display
 from renderer.errors import SettingsError
 from renderer.frame import Abandoned, Frame, FrameRequest
 from renderer.gaze import Gaze
-from renderer.growth import block_starts
 from renderer.intersection import Intersector
 from renderer.pipeline import Renderer
 from renderer.prepared import PreparedScene, prepare
 from renderer.quality import MAPS, Quality
 from renderer.rays import Hits
+from renderer.tracing import block_starts
 from tests.renderer.drawing import glass_and_mirror
 
 SCREEN = Display(64, 36, width_cm=6.0)

@@ -22,6 +22,7 @@ from renderer.library import SceneLibrary
 from renderer.quality import Quality
 from renderer.standard_error import stated_error
 from renderer.store import SampleStore, slots_needed, slots_of
+from renderer.tracing import ThreadTracing
 from renderer.whitted import view_of
 from renderer.workers import WorkerPool
 
@@ -43,7 +44,7 @@ def ratio(scene: str, quality: Quality, pool: WorkerPool) -> float:
     def sampled(scheme: str, samples: int) -> SampleStore:
         store = SampleStore(slots_needed(cell_map), scheme == "adaptive", 1.0 / exposure)
         how = dataclasses.replace(quality, antialiasing=scheme)
-        grow(prepared, view, cell_map, slots, store, how, samples, pool)
+        grow(prepared, view, cell_map, slots, store, how, samples, pool, ThreadTracing())
         return store
 
     def means(store: SampleStore) -> NDArray[np.float64]:

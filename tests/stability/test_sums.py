@@ -17,7 +17,6 @@ from renderer.display import Display
 from renderer.frame import FrameRequest, RayCounts
 from renderer.fresnel import fresnel, refracted_cosine
 from renderer.gaze import Gaze
-from renderer.growth import block_starts, total_rays
 from renderer.kernel import kernel
 from renderer.pipeline import Renderer
 from renderer.prepared import prepare
@@ -28,6 +27,7 @@ from renderer.scene import Mesh, Scene, Sphere
 from renderer.sphere import hit_distance
 from renderer.surface import weights_at
 from renderer.texture import wrap
+from renderer.tracing import block_starts, total_rays
 from tests.renderer.cell_point import places
 from tests.renderer.drawing import (
     EVERYWHERE_1,

@@ -1,0 +1,118 @@
+"""Where the cells of a frame are handed over to be traced: one seam, whatever traces them behind it."""
+
+from __future__ import annotations
+
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.adaptive import Squares
+from renderer.frame import RayCounts
+from renderer.prepared import PreparedScene
+from renderer.quality import Quality
+from renderer.store import SampleStore, add_samples
+from renderer.whitted import Cells, View, block_rays, trace_cells
+from renderer.workers import Workers
+
+
+class Lack(NamedTuple):
+    """Samples that some squares of a screen lack.
+
+    Attributes:
+        prepared: the scene, with the effects that `quality` forces on or off.
+        view: the camera.
+        quality: samples a cell gets in the end, antialiasing, depth and effects.
+        squares: of the screen.
+        chosen: (c,) int32 which of them, no two with the same slot.
+        first, until: (c,) int32 samples first .. until - 1 of each; `first` is what the store has.
+    """
+
+    prepared: PreparedScene
+    view: View
+    quality: Quality
+    squares: Squares
+    chosen: NDArray[np.int32]
+    first: NDArray[np.int32]
+    until: NDArray[np.int32]
+
+
+class Traced(NamedTuple):
+    """What tracing them took.
+
+    Attributes:
+        rays: by kind.
+        rejected: (3,) int64 samples that were no light, as `RejectedSamples` has them.
+    """
+
+    rays: RayCounts
+    rejected: NDArray[np.int64]
+
+
+class Tracing(Protocol):
+    """A way through which samples are traced.
+
+    Frames do not depend on it: every way leaves the very same bits in the store.
+    """
+
+    def trace(self, lack: Lack, store: SampleStore, pool: Workers) -> Traced:
+        """Trace what is lacking and add it to `store`, the samples of a square in their order.
+
+        Args:
+            lack: scene, camera and samples.
+            store: held by the caller.
+            pool: threads of this process, and when to give up.
+
+        Raises:
+            Abandoned: if `pool.abandon` is set before the end. A square then has all of its samples or none of them.
+        """
+
+
+class ThreadTracing:
+    """Traces on the threads of this process."""
+
+    def trace(self, lack: Lack, store: SampleStore, pool: Workers) -> Traced:
+        """Trace block after block of the samples, each added to the store by the thread that traced it."""
+        prepared, view, quality, squares, chosen, first, until = lack
+        samples, spread, white = store.samples, store.spread, store.white
+        starts = block_starts(until - first, block_rays(prepared, quality))
+        counts = [RayCounts()] * (len(starts) - 1)
+        rejected = np.zeros((len(starts) - 1, 3), dtype=np.int64)
+
+        def trace_block(block: int) -> None:
+            part = slice(starts[block], starts[block + 1])
+            some = Cells(squares.x, squares.y, squares.side, chosen[part], first[part], until[part])
+            radiance, counts[block] = trace_cells(prepared, view, some, quality)
+            rejected[block] = add_samples(samples, spread, white, squares.slots, some.chosen, some.until, radiance)
+
+        pool.run(trace_block, len(counts))
+        return Traced(total_rays(counts), rejected.sum(axis=0))
+
+
+def block_starts(samples: NDArray[np.int32], block: int) -> list[int]:
+    """Where to cut a row of cells into blocks of at most `block` samples, or of a single cell of more.
+
+    Args:
+        samples: (c,) int32 samples of each cell, 1 or more.
+        block: most samples of a block.
+
+    Returns:
+        the first cell of each block, and c.
+    """
+    ends = np.cumsum(samples, dtype=np.int64)
+    starts = [0]
+    while starts[-1] < len(samples):
+        start = starts[-1]
+        before = int(ends[start - 1]) if start else 0
+        starts.append(max(start + 1, int(np.searchsorted(ends, before + block, side="right"))))
+    return starts
+
+
+def total_rays(counts: list[RayCounts]) -> RayCounts:
+    """The sum of several counts."""
+    return RayCounts(
+        primary=sum(count.primary for count in counts),
+        shadow=sum(count.shadow for count in counts),
+        reflection=sum(count.reflection for count in counts),
+        refraction=sum(count.refraction for count in counts),
+    )
