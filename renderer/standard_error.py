@@ -10,7 +10,8 @@ cells. It bounds that of `regular` ones, and of shadow rays to lights with a siz
 they err less.
 
 One sample cannot tell how far off it is. Its cell is judged by its neighbours: by `NEIGHBOURS_SHARE` of the mean
-squared difference from those beside, above and below. That is a guess, good to a factor of two.
+squared difference from those beside, above and below. That is a guess, good to a factor of two, and of a large map
+every few cells make it for all: looking around every cell would take a tenth of a frame of one sample each.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from renderer.cellmap import CellMap
 from renderer.display import Display
 from renderer.eccentricity import EyeGeometry, eye_geometry
 from renderer.gaze import Gaze, GazeBucket
-from renderer.kernel import kernel
+from renderer.kernel import formula, kernel
 from renderer.store import Samples
 from renderer.workers import Workers
 
@@ -37,6 +38,9 @@ NEIGHBOURS_SHARE = 0.25
 """Squared error of a cell's central sample over its mean squared difference from the cells around it. It is 0.5 where
 these have nothing to do with each other (each differs from its mean by their common variance, from each other by
 twice that), and 0.14 where straight edges between flat areas pass through, of which the centres see all or nothing."""
+
+GUESSED_CELLS = 65_536
+"""How many cells of a map, about, make the guess: their mean is then off by a percent or so."""
 
 CHUNK_CELLS = 65_536
 """Cells summed together."""
@@ -85,13 +89,14 @@ def stated_error(
     """
     eye = eye_geometry(display, Acuity(), GazeBucket(gaze.x, gaze.y, 0))
     chunks = -(-cell_map.cells // CHUNK_CELLS)
+    every = 1 + cell_map.cells // GUESSED_CELLS
     sums = np.zeros((chunks, 5))
 
     def add(chunk: int) -> None:
         first = chunk * CHUNK_CELLS
         last = min(first + CHUNK_CELLS, cell_map.cells)
         _sum_errors(
-            eye, cell_map.x, cell_map.y, cell_map.side, cell_map.mask, slots, samples, first, last,
+            eye, cell_map.x, cell_map.y, cell_map.side, cell_map.mask, slots, samples, every, first, last,
             sums[chunk],
         )  # fmt: skip
 
@@ -104,6 +109,22 @@ def stated_error(
     )
 
 
+@formula
+def _difference_around(
+    x: int, y: int, side: int, mean: float, mask: NDArray[np.int32], slots: NDArray[np.int64], samples: Samples
+) -> float:
+    """Mean squared difference of a cell's mean from those of the cells beside, above and below; 0 if there is none."""
+    height, width = mask.shape
+    half, total, found = side // 2, 0.0, 0
+    for px, py in ((x - 1, y + half), (x + side, y + half), (x + half, y - 1), (x + half, y + side)):
+        if px >= 0 and py >= 0 and px < width and py < height:
+            slot = slots[mask[py, px]]
+            difference = np.float64(samples.shown[slot]) / samples.number[slot] - mean
+            total += difference * difference
+            found += 1
+    return total / found if found > 0 else 0.0
+
+
 @kernel
 def _sum_errors(
     eye: EyeGeometry,
@@ -113,41 +134,40 @@ def _sum_errors(
     mask: NDArray[np.int32],
     slots: NDArray[np.int64],
     samples: Samples,
+    every: int,
     first: int,
     last: int,
     sums: NDArray[np.float64],
 ) -> None:
     """Squared error times area and area of cells `first` to `last` - 1, those of cells in the fovea, and the area of
-    cells with one sample, into `sums`, (5,).
+    cells with one sample, into `sums`, (5,). Of the latter one in `every` speaks for the others.
     """
     shown, square, count = samples.shown, samples.square, samples.number
-    height, width = mask.shape
     distance2 = eye.distance * eye.distance
     limit = math.cos(math.radians(FOVEA_DEG)) ** 2
     reach = limit * (eye.gaze_x * eye.gaze_x + eye.gaze_y * eye.gaze_y + distance2)
+    screen = screen_area = fovea = foveal_area = guessed_area = 0.0
+    spokesman = -(-first // every) * every
     for cell in range(first, last):
         slot, side = slots[cell], sides[cell]
-        n = float(count[slot])
-        mean = np.float64(shown[slot]) / n
+        number = count[slot]
         area = float(side) * float(side)
-        if n > 1.0:
-            error = max(0.0, np.float64(square[slot]) / n - mean * mean) / (n - 1.0)
+        error = 0.0
+        if number > 1:
+            mean = np.float64(shown[slot]) / number
+            error = max(0.0, np.float64(square[slot]) / number - mean * mean) / (number - 1)
         else:
-            differences, beside = 0.0, 0
-            for place in range(4):
-                px = x[cell] + (side // 2 if place >= 2 else -1 if place == 0 else side)
-                py = y[cell] + (side // 2 if place < 2 else -1 if place == 2 else side)
-                if px >= 0 and py >= 0 and px < width and py < height:
-                    other = slots[mask[py, px]]
-                    differences += (np.float64(shown[other]) / float(count[other]) - mean) ** 2
-                    beside += 1
-            error = NEIGHBOURS_SHARE * differences / beside if beside > 0 else 0.0
-            sums[4] += area
-        sums[0] += error * area
-        sums[1] += area
+            guessed_area += area
+            if cell >= spokesman:
+                spokesman = cell + every
+                around = _difference_around(x[cell], y[cell], side, np.float64(shown[slot]), mask, slots, samples)
+                error = every * NEIGHBOURS_SHARE * around
+        screen += error * area
+        screen_area += area
         px_cm = (x[cell] + 0.5 * side - eye.width_px / 2) * eye.pitch_x
         py_cm = (y[cell] + 0.5 * side - eye.height_px / 2) * eye.pitch_y
         along = px_cm * eye.gaze_x + py_cm * eye.gaze_y + distance2
         if along > 0.0 and along * along >= reach * (px_cm * px_cm + py_cm * py_cm + distance2):
-            sums[2] += error * area
-            sums[3] += area
+            fovea += error * area
+            foveal_area += area
+    sums[0], sums[1], sums[2], sums[3], sums[4] = screen, screen_area, fovea, foveal_area, guessed_area
