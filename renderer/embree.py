@@ -20,6 +20,7 @@ import functools
 import logging
 import math
 import weakref
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -50,7 +51,7 @@ INVOKE_FILTER, COHERENT = 1 << 1, 1 << 16
 
 EVERY_FEATURE = 0xFFFFFFFF
 
-ORIGIN, NEAR, DIRECTION, TIME, FAR, MASK, IDENTITY, FLAGS = 0, 3, 4, 7, 8, 9, 10, 11
+ORIGIN, NEAR, DIRECTION, TIME, FAR, MASK, FLAGS = 0, 3, 4, 7, 8, 9, 11
 HIT = 12
 WEIGHT_1, WEIGHT_2, PRIMITIVE, GEOMETRY = 3, 4, 5, 6
 """Rows of a packet, each as wide as the packet; those of this line count from HIT."""
@@ -267,7 +268,7 @@ def _open_library() -> Packets:
                 ctypes.cast(getattr(library, f"{name}{width}"), ctypes.c_void_p).value or 0
                 for name in ("rtcIntersect", "rtcOccluded")
             )
-            return Packets(library, device, width, intersect, occluded, c_function(_keep_nearest).address)
+            return Packets(library, device, width, intersect, occluded, c_function(_keeper(width)).address)
     raise ValueError("Embree traces no packets on this processor")
 
 
@@ -343,30 +344,36 @@ def _aligned(words: int) -> NDArray[np.float32]:
     return raw[start : start + 4 * words].view(np.float32)
 
 
-def _keep_nearest(arguments: Any) -> None:
-    """Note the nearest hit of each ray, of two equally near the lower number (RTCFilterFunctionNArguments).
+def _keeper(width: int) -> Callable[[Any], None]:
+    """The filter of packets of `width` rays."""
 
-    Its distance is at hand in the ray; the ray is then given a reach a little beyond it.
-    """
-    integer, real = np.int32(0), np.float32(0)
-    valid, numbers = at(arguments[0], integer), at(arguments[2], integer)
-    distances, ray = at(arguments[2], real), at(arguments[3], real)
-    lanes, hit, weights = at(arguments[3], integer), at(arguments[4], integer), at(arguments[4], real)
-    width = arguments[5] & 0xFFFFFFFF
-    for k in range(width):
-        if valid[k] == 0:
-            continue
-        lane = lanes[IDENTITY * width + k]
-        distance, number = ray[FAR * width + k], hit[PRIMITIVE * width + k]
-        held = distances[DISTANCES + lane]
-        if distance > held or (distance == held and number > numbers[NUMBERS + lane]):
-            valid[k] = 0
-        else:
-            distances[DISTANCES + lane] = distance
-            numbers[NUMBERS + lane] = number
-            b1, b2 = weights[WEIGHT_1 * width + k], weights[WEIGHT_2 * width + k]
-            distances[MARGINS + lane] = min(min(b1, b2), np.float32(1.0) - b1 - b2)
-            ray[FAR * width + k] = distance * BEYOND
+    def keep_nearest(arguments: Any) -> None:
+        """Note the nearest hit of each ray, of two equally near the lower number (RTCFilterFunctionNArguments).
+
+        Its distance is at hand in the ray; the ray is then given a reach a little beyond it. No lane goes its own
+        way, so that the compiler takes them together. An Embree that hands over part of a packet gets no answer,
+        which the comparison at the first use finds out.
+        """
+        if arguments[5] & 0xFFFFFFFF != width:
+            return
+        integer, real = np.int32(0), np.float32(0)
+        valid, numbers = at(arguments[0], integer), at(arguments[2], integer)
+        distances, ray = at(arguments[2], real), at(arguments[3], real)
+        hit, weights = at(arguments[4], integer), at(arguments[4], real)
+        for lane in range(width):
+            distance, number = ray[FAR * width + lane], hit[PRIMITIVE * width + lane]
+            held, held_number = distances[DISTANCES + lane], numbers[NUMBERS + lane]
+            nearer = (distance < held) | ((distance == held) & (number <= held_number))
+            keep = (valid[lane] != 0) & nearer
+            b1, b2 = weights[WEIGHT_1 * width + lane], weights[WEIGHT_2 * width + lane]
+            margin = min(min(b1, b2), np.float32(1.0) - b1 - b2)
+            valid[lane] = -1 if keep else 0
+            distances[DISTANCES + lane] = distance if keep else held
+            numbers[NUMBERS + lane] = number if keep else held_number
+            distances[MARGINS + lane] = margin if keep else distances[MARGINS + lane]
+            ray[FAR * width + lane] = distance * BEYOND if keep else distance
+
+    return keep_nearest
 
 
 @formula
@@ -390,7 +397,6 @@ def _load_ray(
     packet[TIME * width + lane] = 0.0
     packet[FAR * width + lane] = reach
     words[MASK * width + lane] = -1
-    words[IDENTITY * width + lane] = lane
     words[FLAGS * width + lane] = 0
     words[(HIT + PRIMITIVE) * width + lane] = -1
     words[(HIT + GEOMETRY) * width + lane] = -1

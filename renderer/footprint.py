@@ -16,7 +16,7 @@ from renderer.surface import Surface
 
 
 @formula
-def pencil_spread(side: int, points: int, pixel: float, length: float) -> float:
+def pencil_spread(side: int, points: int, pixel: float, inverse: float) -> float:
     """Growth of the width of a camera ray with distance: the side of a square that covers its share of its cell.
 
     The samples of a cell share its area, so that more of them sharpen.
@@ -25,9 +25,9 @@ def pencil_spread(side: int, points: int, pixel: float, length: float) -> float:
         side: of the cell [px].
         points: samples that the cell gets in the end.
         pixel: side of a pixel at distance 1 along the view.
-        length: distance to the pixel, in the same units, at least 1.
+        inverse: 1 over the distance to the pixel, in the same units, at most 1.
     """
-    return side * pixel / (math.sqrt(points) * length * math.sqrt(length))
+    return side * (pixel / math.sqrt(points)) * inverse * math.sqrt(inverse)
 
 
 @formula

@@ -58,9 +58,9 @@ def light_from_points(
     wr: float,
     wg: float,
     wb: float,
-    dx: float,
-    dy: float,
-    dz: float,
+    vx: float,
+    vy: float,
+    vz: float,
     sample: int,
     lights: NDArray[np.void],
     radiance: NDArray[np.float32],
@@ -74,7 +74,7 @@ def light_from_points(
         material: its row of the material table.
         finish: the material at this place.
         wr, wg, wb: share of the surface's light that reaches the eye.
-        dx, dy, dz: direction of the ray that met it.
+        vx, vy, vz: direction `towards_eye`.
         sample: camera sample of the block.
         lights: (l,) LIGHT.
         radiance: (samples, 3) float32, added to.
@@ -86,7 +86,7 @@ def light_from_points(
     """
     for index in range(len(lights)):
         light = lights[index]
-        red, green, blue, inverse = _light_to_eye(s, material, finish, light, -dx, -dy, -dz)
+        red, green, blue, inverse = _light_to_eye(s, material, finish, light, vx, vy, vz)
         red, green, blue = wr * red, wg * green, wb * blue
         if not max(red, max(green, blue)) > 0.0:
             continue
@@ -121,9 +121,9 @@ def light_from_areas(
     wr: float,
     wg: float,
     wb: float,
-    dx: float,
-    dy: float,
-    dz: float,
+    vx: float,
+    vy: float,
+    vz: float,
     sample: int,
     lights: NDArray[np.void],
     draws: LightSamples,
@@ -134,7 +134,7 @@ def light_from_areas(
     """The same as `light_from_points` for lights with a size.
 
     Args:
-        s, material, finish, wr, wg, wb, dx, dy, dz, sample, radiance, n_shadows: as there.
+        s, material, finish, wr, wg, wb, vx, vy, vz, sample, radiance, n_shadows: as there.
         lights: (l,) AREA_LIGHT.
         draws: the camera samples of the block.
         shadows: shadow rays; room for another l * draws.each.
@@ -159,7 +159,7 @@ def light_from_areas(
             cosine = lx * s.nx + ly * s.ny + lz * s.nz
             if not cosine > 0.0 or _is_behind(material, finish, lx, ly, lz):
                 continue
-            red, green, blue = reflectance(s, material, finish, cosine, lx, ly, lz, -dx, -dy, -dz)
+            red, green, blue = reflectance(s, material, finish, cosine, lx, ly, lz, vx, vy, vz)
             share /= each
             red, green, blue = (
                 wr * red * (light.red * share),

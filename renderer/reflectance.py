@@ -23,15 +23,30 @@ def phong_lobe(s: Surface, lx: float, ly: float, lz: float, vx: float, vy: float
     Args:
         s: the surface.
         lx, ly, lz: unit direction to the light.
-        vx, vy, vz: direction to the eye, of unit length but for float32 rounding, which a large exponent
-            would turn into a factor.
+        vx, vy, vz: unit direction to the eye.
         shininess: exponent, 0 to 1e9.
     """
     twice = 2.0 * (s.nx * lx + s.ny * ly + s.nz * lz)
     cosine = (twice * s.nx - lx) * vx + (twice * s.ny - ly) * vy + (twice * s.nz - lz) * vz
     if not cosine > 0.0:
         return 0.0
-    return float(min(1.0, cosine / math.sqrt(vx * vx + vy * vy + vz * vz)) ** shininess)
+    return float(min(1.0, cosine) ** shininess)
+
+
+@formula
+def towards_eye(material: Any, dx: float, dy: float, dz: float) -> tuple[float, float, float]:
+    """Direction to the eye, of unit length where the material has a highlight.
+
+    A ray's direction is of unit length but for float32 rounding, which a large exponent would turn into a factor.
+
+    Args:
+        material: its row of the material table.
+        dx, dy, dz: direction of the ray that met it.
+    """
+    if material.calls & (SPECULAR | MICROFACETS) == 0:
+        return -dx, -dy, -dz
+    inverse = 1.0 / math.sqrt(dx * dx + dy * dy + dz * dz)
+    return -dx * inverse, -dy * inverse, -dz * inverse
 
 
 @formula
@@ -55,7 +70,7 @@ def reflectance(
         finish: the material at this place.
         cosine: of the angle between the light and the shading normal, above 0.
         lx, ly, lz: unit direction to the light.
-        vx, vy, vz: direction to the eye, of unit length but for float32 rounding.
+        vx, vy, vz: direction `towards_eye`.
     """
     if material.calls & MICROFACETS != 0:
         return _microfacets(s, material, finish, lx, ly, lz, vx, vy, vz)
@@ -82,11 +97,10 @@ def _microfacets(
     vz: float,
 ) -> tuple[float, float, float]:
     """`reflectance` of the base of Ashikhmin and Shirley."""
-    inverse = 1.0 / math.sqrt(vx * vx + vy * vy + vz * vz)
     gloss, schlick, matt = ashikhmin_shirley(
         s.nx, s.ny, s.nz, finish.ux, finish.uy, finish.uz,
         np.float64(material.exponent_u), np.float64(material.exponent_v),
-        lx, ly, lz, vx * inverse, vy * inverse, vz * inverse,
+        lx, ly, lz, vx, vy, vz,
     )  # fmt: skip
     return (
         gloss * (finish.sr + (1.0 - finish.sr) * schlick) + matt * (1.0 - finish.sr) * finish.kr,

@@ -147,11 +147,11 @@ def camera_rays(
             dx = corner[0] + px * step_x[0] + py * step_y[0]
             dy = corner[1] + px * step_x[1] + py * step_y[1]
             dz = corner[2] + px * step_x[2] + py * step_y[2]
-            length = np.sqrt(dx * dx + dy * dy + dz * dz)
-            directions[ray, 0], directions[ray, 1], directions[ray, 2] = dx / length, dy / length, dz / length
+            inverse = 1.0 / np.sqrt(dx * dx + dy * dy + dz * dz)
+            directions[ray, 0], directions[ray, 1], directions[ray, 2] = dx * inverse, dy * inverse, dz * inverse
             for axis in range(3):
                 origins[ray, axis] = origin[axis]
                 weights[ray, axis] = 1.0
             sample_of[ray] = ray
-            pencils[ray, 0], pencils[ray, 1] = 0.0, pencil_spread(side[cell], points, pixel, length)
+            pencils[ray, 0], pencils[ray, 1] = 0.0, pencil_spread(side[cell], points, pixel, inverse)
             ray += 1

@@ -28,7 +28,7 @@ from renderer.media import crossed, dominant
 from renderer.normal_map import bumped, mirroring
 from renderer.prepared import DENSITY_COLUMN, OTHER_COLUMN, Surfaces
 from renderer.rays import Hits, Rays, ShadowRays
-from renderer.reflectance import even_light
+from renderer.reflectance import even_light, towards_eye
 from renderer.surface import Surface, sphere_surface, triangle_surface, weights_at
 from renderer.tangent import HANDED_COLUMN
 from renderer.texture import filtered
@@ -198,11 +198,12 @@ def shade(
         radiance[sample, 1] += wg * (material.emission_green + ag * around[2, 1])
         radiance[sample, 2] += wb * (material.emission_blue + ab * around[2, 2])
         if material.calls & LIT != 0:
+            vx, vy, vz = towards_eye(material, dx, dy, dz)
             n_shadows = light_from_points(
-                s, material, finish, wr, wg, wb, dx, dy, dz, sample, lights, radiance, shadows, n_shadows
+                s, material, finish, wr, wg, wb, vx, vy, vz, sample, lights, radiance, shadows, n_shadows
             )
             n_shadows = light_from_areas(
-                s, material, finish, wr, wg, wb, dx, dy, dz, sample, area_lights, draws, radiance, shadows, n_shadows
+                s, material, finish, wr, wg, wb, vx, vy, vz, sample, area_lights, draws, radiance, shadows, n_shadows
             )
         if not spawn or material.calls & SPAWNS == 0:
             continue

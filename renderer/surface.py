@@ -85,10 +85,13 @@ def weights_at(
         return 0.0, 0.0
     sx, sy, sz = ox - ax, oy - ay, oz - az
     qx, qy, qz = sy * bz - sz * by, sz * bx - sx * bz, sx * by - sy * bx
-    b1 = min(1.0, max(0.0, (sx * hx + sy * hy + sz * hz) / volume))
-    b2 = min(1.0, max(0.0, (dx * qx + dy * qy + dz * qz) / volume))
-    beyond = max(1.0, b1 + b2)
-    return b1 / beyond, b2 / beyond
+    inverse = 1.0 / volume
+    b1 = min(1.0, max(0.0, (sx * hx + sy * hy + sz * hz) * inverse))
+    b2 = min(1.0, max(0.0, (dx * qx + dy * qy + dz * qz) * inverse))
+    if b1 + b2 > 1.0:
+        inverse = 1.0 / (b1 + b2)
+        return b1 * inverse, b2 * inverse
+    return b1, b2
 
 
 @formula

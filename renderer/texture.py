@@ -78,19 +78,23 @@ def look_up(
     linear: NDArray[np.float64],
     pictures: NDArray[np.void],
     row: int,
-    u: float,
-    v: float,
+    across: float,
+    down: float,
+    wrap_u: int,
+    wrap_v: int,
 ) -> tuple[float, float, float]:
-    """Bilinear linear-light colour at (u, v) of one level of a picture; texel centres at half-integers, v up.
+    """Bilinear linear-light colour at a place of one level of a picture; texel centres at half-integers.
 
     Args:
         texels, linear, pictures: of the atlas.
         row: of the level among `pictures`.
+        across, down: share of its width and height, 0 to 1, from its upper left.
+        wrap_u, wrap_v: REPEAT, CLAMP or MIRROR.
     """
     picture = pictures[row]
     width, height = picture.width, picture.height
-    left, right, fx = neighbours(within(u, picture.wrap_u) * width, width, picture.wrap_u)
-    top, bottom, fy = neighbours((1.0 - within(v, picture.wrap_v)) * height, height, picture.wrap_v)
+    left, right, fx = neighbours(across * width, width, wrap_u)
+    top, bottom, fy = neighbours(down * height, height, wrap_v)
     upper, lower = picture.start + top * width, picture.start + bottom * width
     a, b = texels[upper + left], texels[upper + right]
     c, d = texels[lower + left], texels[lower + right]
@@ -153,14 +157,13 @@ def filtered(
         area: of the footprint in texture coordinates.
     """
     picture = pictures[row]
-    level = level_of(area, picture.texels)
-    if not level > 0.0:
-        return look_up(texels, linear, pictures, row, u, v)
-    last = picture.levels - 1
-    if level >= last:
-        return look_up(texels, linear, pictures, row + last, u, v)
-    whole = int(level)
+    wrap_u, wrap_v = picture.wrap_u, picture.wrap_v
+    across, down = within(u, wrap_u), 1.0 - within(v, wrap_v)
+    level = min(level_of(area, picture.texels), picture.levels - 1.0)
+    whole = int(max(0.0, level))
+    red, green, blue = look_up(texels, linear, pictures, row + whole, across, down, wrap_u, wrap_v)
     share = level - whole
-    red, green, blue = look_up(texels, linear, pictures, row + whole, u, v)
-    r, g, b = look_up(texels, linear, pictures, row + whole + 1, u, v)
+    if not share > 0.0:
+        return red, green, blue
+    r, g, b = look_up(texels, linear, pictures, row + whole + 1, across, down, wrap_u, wrap_v)
     return red + share * (r - red), green + share * (g - green), blue + share * (b - blue)

@@ -109,7 +109,7 @@ def test_pixels_share_the_screen(fov_deg: float) -> None:
     x, y = np.meshgrid(np.arange(80) + 0.5, np.arange(60) + 0.5)
     length = np.linalg.norm(view.corner + x[..., None] * view.step_x + y[..., None] * view.step_y, axis=2)
     side = math.sqrt(float(np.linalg.norm(view.step_x) * np.linalg.norm(view.step_y)))
-    total = sum(pencil_spread(1, 1, side, away) ** 2 for away in length.ravel())
+    total = sum(pencil_spread(1, 1, side, 1.0 / away) ** 2 for away in length.ravel())
     a, b = math.tan(math.radians(fov_deg / 2)) * np.array([1.0, display.aspect])
     assert total == pytest.approx(4 * math.asin(a * b / math.sqrt((1 + a * a) * (1 + b * b))), rel=1e-3)
 
