@@ -98,7 +98,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import tomllib
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
@@ -109,7 +108,7 @@ from numpy.typing import NDArray
 from renderer.camera import MAX_POSITION_M, Camera
 from renderer.camera_path import read_camera_path
 from renderer.codec import decode_texture
-from renderer.errors import SceneError, SettingsError
+from renderer.errors import SettingsError
 from renderer.fields import Fields
 from renderer.folder import MAX_FILE_BYTES, Folder
 from renderer.framing import DEFAULT_MATERIAL, STUDIO, bounding_sphere, framed_camera, framed_lights
@@ -138,6 +137,7 @@ from renderer.scene import (
     Surroundings,
     Texture,
 )
+from renderer.toml_text import read_toml
 
 SCENE_FILE: Final = "scene.toml"
 """Name of the file that makes a folder a scene."""
@@ -165,11 +165,7 @@ def load_scene_folder(
     tree = Folder(folder.resolve(), str(folder) if label is None else label, max_bytes)
     file = tree.file_label(SCENE_FILE)
     data, _ = tree.read(SCENE_FILE, file)
-    try:
-        values = tomllib.loads(data.decode("utf-8-sig"))
-    except (ValueError, RecursionError) as error:
-        raise SceneError(f"{file}: expected TOML, found a mistake: {error}") from None
-    return _Reader(tree, max_triangles).scene(Fields(values, file))
+    return _Reader(tree, max_triangles).scene(Fields(read_toml(data, file), file))
 
 
 @dataclass(slots=True)

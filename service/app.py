@@ -87,6 +87,7 @@ def create_app(
         redoc_url=None,
         redirect_slashes=False,
     )
+    app.state.connections = set()
     answer_errors(app)
     for part in (frames, cells, scenes, accuracy, stream, pages):
         app.include_router(part.router)

@@ -5,13 +5,15 @@ from __future__ import annotations
 import asyncio
 import socket
 import struct
+from collections.abc import Mapping
 from http import HTTPStatus
 
-from starlette.responses import Response
+from fastapi import FastAPI
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from service.headers import SECURITY_HEADERS
 from service.problem import RETRY_AFTER_S, problem
+from service.request_log import connection_refused
 from service.settings import Settings
 
 
@@ -20,9 +22,11 @@ class Connection(H11Protocol):
 
     Attributes:
         settings: how many connections there may be, and how long a client may take.
+        service: counts those that are refused.
     """
 
     settings: Settings
+    service: FastAPI
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """Give the client its time, or send it away if there are too many."""
@@ -31,7 +35,7 @@ class Connection(H11Protocol):
         super().connection_made(transport)
         if len(self.connections) > self.settings.max_connections:
             detail = f"this service has its {self.settings.max_connections} connections already"
-            self._end(problem(503, detail, "too-many", headers={"Retry-After": str(RETRY_AFTER_S)}))
+            self._refuse(HTTPStatus.SERVICE_UNAVAILABLE, "too-many", detail, {"Retry-After": str(RETRY_AFTER_S)})
         else:
             self._await_request()
 
@@ -68,9 +72,13 @@ class Connection(H11Protocol):
 
     def _give_up(self) -> None:
         """The request is not whole; an answer only makes sense where none has begun."""
-        answered = self.cycle is not None and self.cycle.response_started and not self.cycle.response_complete
         detail = f"expected a whole request within {self.settings.client_timeout_s} s"
-        self._end(None if answered else problem(HTTPStatus.REQUEST_TIMEOUT, detail, "request-timeout"))
+        self._refuse(HTTPStatus.REQUEST_TIMEOUT, "request-timeout", detail)
+
+    def send_400_response(self, msg: str) -> None:
+        """Refuse what is no HTTP, or whose head is too long."""
+        detail = f"expected HTTP/1.1, its head at most {self.settings.max_header_bytes:,} bytes long, found: {msg}"
+        self._refuse(HTTPStatus.BAD_REQUEST, "damaged-request", detail)
 
     def _drop(self) -> None:
         """End the connection and forget what the kernel has still to send: it would keep that for minutes."""
@@ -78,9 +86,12 @@ class Connection(H11Protocol):
         self.transport.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, at_once)
         self.transport.abort()
 
-    def _end(self, reply: Response | None) -> None:
-        if reply is not None and not self.transport.is_closing():
-            status = HTTPStatus(reply.status_code)
+    def _refuse(self, status: HTTPStatus, kind: str, detail: str, headers: Mapping[str, str] | None = None) -> None:
+        """Say why, unless a reply has begun, and end the connection."""
+        connection_refused(self.service, status, kind, detail)
+        answered = self.cycle is not None and self.cycle.response_started and not self.cycle.response_complete
+        if not answered and not self.transport.is_closing():
+            reply = problem(status, detail, kind, headers=headers)
             lines = [b"HTTP/1.1 %d %s" % (status, status.phrase.encode()), b"connection: close"]
             lines += [b"%s: %s" % header for header in reply.raw_headers]
             lines += [f"{name}: {value}".encode() for name, value in SECURITY_HEADERS.items()]
@@ -88,9 +99,9 @@ class Connection(H11Protocol):
         self.transport.close()
 
 
-def connection_of(settings: Settings) -> type[Connection]:
+def connection_of(settings: Settings, service: FastAPI) -> type[Connection]:
     """The class of a service's connections."""
-    return type("Connection", (Connection,), {"settings": settings})
+    return type("Connection", (Connection,), {"settings": settings, "service": service})
 
 
 def _cancel(timer: asyncio.TimerHandle | None) -> None:

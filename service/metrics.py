@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, fields
+from dataclasses import asdict, dataclass, fields
 
-from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, generate_latest
+from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, ProcessCollector, generate_latest
 from prometheus_client.exposition import CONTENT_TYPE_LATEST
 
 from renderer.frame import FrameCost, RejectedSamples
@@ -16,6 +16,26 @@ BUCKETS_S = (0.001, 0.002, 0.005, 0.01, 0.02, 0.033, 0.05, 0.07, 0.1, 0.2, 0.5, 
 """Upper ends of the histograms' buckets [s]; 33 ms is a frame of 30 a second, 70 ms what an eye tolerates."""
 
 MEDIA_TYPE = CONTENT_TYPE_LATEST
+
+
+@dataclass(frozen=True, slots=True)
+class Now:
+    """A service at one moment.
+
+    Attributes:
+        connections: of clients, streams among them.
+        sessions, viewers, gaze_sources: of streams.
+        running_frames, waiting_frames: of requests: in work, and waiting for their turn.
+        held_bytes: kept between frames, by kind.
+    """
+
+    connections: int
+    sessions: int
+    viewers: int
+    gaze_sources: int
+    running_frames: int
+    waiting_frames: int
+    held_bytes: Mapping[str, int]
 
 
 class Metrics:
@@ -39,9 +59,13 @@ class Metrics:
         self._latency = self._histogram(
             "gaze_to_frame_seconds", "From the arrival of a gaze to the encoded frame that follows a move of it."
         )
+        self._connections = self._gauge("connections", "Connections of clients, streams among them.")
         self._sessions = self._gauge("sessions", "Streaming sessions.")
         self._viewers = self._gauge("viewers", "Viewers connected.")
         self._sources = self._gauge("gaze_sources", "Gaze sources connected.")
+        self._queue = self._gauge("requested_frames", "Frames of requests, running or waiting for their turn.", "state")
+        self._held = self._gauge("held_bytes", "Memory of what is kept between frames.", "kind")
+        ProcessCollector(registry=self._registry)
 
     def frame(self, cost: FrameCost, stages_ms: Mapping[str, float]) -> None:
         """A frame was rendered.
@@ -75,7 +99,7 @@ class Metrics:
         self._latency.observe(total_ms / MS_PER_S)
 
     def refused(self, via: str, kind: str) -> None:
-        """A request (`http`) was refused, or a client of a stream (`websocket`) sent away."""
+        """A request (`http`) or a `connection` was refused, or a client of a stream (`websocket`) sent away."""
         self._refused.labels(via, kind).inc()
 
     def superseded(self) -> None:
@@ -86,18 +110,23 @@ class Metrics:
         """A viewer missed a frame."""
         self._dropped.inc()
 
-    def text(self, sessions: int, viewers: int, sources: int) -> bytes:
-        """Everything, in Prometheus' text format; the arguments are as of now."""
-        self._sessions.set(sessions)
-        self._viewers.set(viewers)
-        self._sources.set(sources)
+    def text(self, now: Now) -> bytes:
+        """Everything, in Prometheus' text format."""
+        self._connections.set(now.connections)
+        self._sessions.set(now.sessions)
+        self._viewers.set(now.viewers)
+        self._sources.set(now.gaze_sources)
+        self._queue.labels("running").set(now.running_frames)
+        self._queue.labels("waiting").set(now.waiting_frames)
+        for kind, size in now.held_bytes.items():
+            self._held.labels(kind).set(size)
         return generate_latest(self._registry)
 
     def _counter(self, name: str, text: str, *labels: str) -> Counter:
         return Counter(f"gazetrace_{name}", text, labels, registry=self._registry)
 
-    def _gauge(self, name: str, text: str) -> Gauge:
-        return Gauge(f"gazetrace_{name}", text, registry=self._registry)
+    def _gauge(self, name: str, text: str, *labels: str) -> Gauge:
+        return Gauge(f"gazetrace_{name}", text, labels, registry=self._registry)
 
     def _histogram(self, name: str, text: str, *labels: str) -> Histogram:
         return Histogram(f"gazetrace_{name}", text, labels, buckets=BUCKETS_S, registry=self._registry)

@@ -11,9 +11,9 @@ from fastapi import APIRouter, HTTPException, Query, Request
 from pydantic import BaseModel, Field
 from starlette.responses import HTMLResponse, Response
 
-from service.desk import TheDesk
+from service.desk import Desk, TheDesk
 from service.docs import documentation
-from service.metrics import MEDIA_TYPE
+from service.metrics import MEDIA_TYPE, Now
 from service.openapi import ERRORS
 from service.request import NoQuery
 
@@ -90,11 +90,25 @@ async def readyz(desk: TheDesk) -> Readiness:
     response_class=Response,
     responses={200: {"description": "Prometheus' text format", "content": {"text/plain": {}}}, 401: ERRORS[401]},
 )
-async def metrics(_: Annotated[NoQuery, Query()], desk: TheDesk) -> Response:
-    """Frames, rays by kind, times of the stages, cache hits, sessions, viewers, what was superseded and dropped."""
+async def metrics(_: Annotated[NoQuery, Query()], request: Request, desk: TheDesk) -> Response:
+    """Frames, rays by kind, times of the stages, cache hits, sessions, viewers, what was superseded and dropped.
+
+    Also connections, frames in work, what was refused and why, and what the process takes of the machine.
+    """
+    return Response(desk.studio.metrics.text(_now(request, desk)), media_type=MEDIA_TYPE)
+
+
+def _now(request: Request, desk: Desk) -> Now:
     sessions = desk.sessions.all()
-    viewers, sources = sum(len(each.viewers) for each in sessions), sum(len(each.sources) for each in sessions)
-    return Response(desk.studio.metrics.text(len(sessions), viewers, sources), media_type=MEDIA_TYPE)
+    return Now(
+        connections=len(request.app.state.connections),
+        sessions=len(sessions),
+        viewers=sum(len(each.viewers) for each in sessions),
+        gaze_sources=sum(len(each.sources) for each in sessions),
+        running_frames=desk.renders.running,
+        waiting_frames=desk.renders.waiting,
+        held_bytes=desk.studio.held_bytes(),
+    )
 
 
 def _file(name: str, request: Request) -> Response:

@@ -200,6 +200,14 @@ class Studio:
         with self.idle.busy():
             return self._renderer.cell_map(display, quality, gaze)
 
+    def held_bytes(self) -> dict[str, int]:
+        """What is kept between frames, by kind."""
+        return {
+            "maps": self._renderer.map_cache.nbytes,
+            "samples": self._renderer.store_cache.nbytes,
+            "scenes": self.library.nbytes,
+        }
+
     def etag(self, order: Order) -> str:
         """A strong ETag of the picture: it changes whenever the bytes can.
 

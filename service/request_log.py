@@ -13,6 +13,7 @@ import time
 from datetime import UTC, datetime
 from http import HTTPStatus
 
+from starlette.applications import Starlette
 from starlette.datastructures import MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
@@ -83,6 +84,13 @@ def name_session(scope: Scope, name: str) -> None:
     scope[SAID]["session"] = name
 
 
+def connection_refused(app: Starlette, status: int, kind: str, why: str) -> None:
+    """Log and count a connection that was ended before there was a request."""
+    app.state.desk.studio.metrics.refused("connection", kind)
+    said: dict[str, object] = {"event": "connection", "status": status, "kind": kind, "why": why}
+    log.info("connection", extra={"said": said})
+
+
 class _Line(logging.Formatter):
     """A record as one line: what a request said of itself, or a message with its traceback, as text or as JSON."""
 
@@ -107,6 +115,8 @@ def configure_logging(as_json: bool, debug: bool) -> None:
         as_json: every request and stream as a line of JSON.
         debug: those that were refused, and why; as text, unless as JSON.
     """
+    # What uvicorn warns of, such as bytes that are no HTTP, is a refusal, which has a line of its own.
+    logging.getLogger("uvicorn.error").setLevel(logging.ERROR)
     if as_json or debug:
         handler = logging.StreamHandler(sys.stderr)
         handler.setFormatter(_Line(as_json))

@@ -51,6 +51,7 @@ class Server(uvicorn.Server):
     def __init__(self, app: FastAPI, settings: Settings) -> None:
         super().__init__(server_config(app, settings))
         self._app = app
+        app.state.connections = self.server_state.connections
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         """Say goodbye, then stop."""
@@ -66,7 +67,7 @@ def server_config(app: FastAPI, settings: Settings) -> uvicorn.Config:
         app,
         log_config=None,
         access_log=False,
-        http=connection_of(settings),
+        http=connection_of(settings, app),
         h11_max_incomplete_event_size=settings.max_header_bytes,
         ws="websockets-sansio",
         ws_max_size=settings.max_message_bytes,

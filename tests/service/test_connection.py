@@ -117,7 +117,15 @@ def test_a_reply_that_nobody_reads_is_dropped(impatient: str) -> None:
 def test_too_large_a_head_is_refused(impatient: str) -> None:
     with connected(impatient) as connection:
         connection.sendall(b"GET / HTTP/1.1\r\nHost: localhost\r\nX: " + b"x" * 4096)
-        assert all_of(connection).startswith(b"HTTP/1.1 400")
+        status, problem = problem_of(all_of(connection))
+        assert (status, problem["type"]) == (400, "urn:gazetrace:problem:damaged-request")
+        assert "2,048 bytes" in problem["detail"]
+
+
+def test_what_is_no_http_is_refused_with_a_reason(impatient: str) -> None:
+    with connected(impatient) as connection:
+        connection.sendall(b"\x16\x03\x01\x02\x00\x01 hello\r\n\r\n")
+        assert problem_of(all_of(connection))[0] == 400
 
 
 def test_connections_are_limited(renderer: Renderer) -> None:
@@ -128,8 +136,10 @@ def test_connections_are_limited(renderer: Renderer) -> None:
                 reply = all_of(third)
                 assert problem_of(reply)[0] == 503
                 assert b"Retry-After: 1" in reply or b"retry-after: 1" in reply
-            first.sendall(b"GET /healthz HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n")
-            assert all_of(first).startswith(b"HTTP/1.1 200")
+            first.sendall(b"GET /metrics HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n")
+            counted = all_of(first)
+            assert b'gazetrace_refusals_total{kind="too-many",via="connection"} 1.0' in counted
+            assert b"gazetrace_connections 2.0" in counted
         while httpx.get(f"{address}/healthz").status_code != 200:
             pass
 

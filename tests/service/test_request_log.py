@@ -11,6 +11,7 @@ from service import protocol
 from tests.service.conftest import PATIENCE_S
 from tests.service.process import ServiceProcess, service_process
 from tests.service.streaming import configure, viewer
+from tests.service.test_connection import all_of, connected
 
 TOKEN = "a-long-secret"
 BEARER = {"Authorization": f"Bearer {TOKEN}"}
@@ -60,11 +61,17 @@ def test_each_request_and_stream_is_a_line_and_counted_if_it_was_refused() -> No
 
 
 def test_debug_says_only_what_was_refused_and_a_path_cannot_forge_a_line() -> None:
-    with service_process("--threads", "1", "--debug") as service:
+    with service_process("--threads", "1", "--debug", "--client-timeout-s", "1") as service:
         assert httpx.get(f"{service.address}/healthz").status_code == 200
         assert httpx.get(f"{service.address}/v1/scenes/x%0Aforged").status_code == 404
+        for sent, status in ((b"nonsense\r\n\r\n", b"400"), (b"GET / HTTP/1.1\r\n", b"408"), (b"", b"408")):
+            with connected(service.address) as connection:
+                connection.sendall(sent)
+                assert all_of(connection).split()[1] == status
     lines = [line for line in service.lines if "event=" in line]
-    assert len(lines) == 1
+    assert len(lines) == 4
     assert '"/v1/scenes/x\\nforged"' in lines[0]
     assert "unknown-scene" in lines[0]
     assert "forged" not in service.lines
+    assert 'event="connection" status=400 kind="damaged-request" why="expected HTTP/1.1' in lines[1]
+    assert all('kind="request-timeout" why="expected a whole request within 1 s"' in line for line in lines[2:])
