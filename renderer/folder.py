@@ -7,6 +7,7 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
+from renderer.codec import MAX_TEXTURE_PIXELS
 from renderer.errors import SceneError
 
 MAX_FILE_BYTES = 1 << 30
@@ -21,11 +22,13 @@ class Folder:
         root: the tree that may be read, without links in it (`Path.resolve`).
         label: what messages call it; may be empty, for the folder the user is in.
         max_bytes: larger files are refused.
+        max_texture_pixels: images of more pixels are refused, each.
     """
 
     root: Path
     label: str
     max_bytes: int = MAX_FILE_BYTES
+    max_texture_pixels: int = MAX_TEXTURE_PIXELS
 
     def read(self, name: str, wanted_by: str, beside: str = "") -> tuple[bytes, str]:
         """The content of a file, and its path from the root.

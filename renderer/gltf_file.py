@@ -210,7 +210,7 @@ class _Reader:
         index = (webp if "source" in webp else texture).integer("source", 0, LARGEST_INDEX)
         wrap_u, wrap_v = self._wraps(texture)
         if (index, wrap_u, wrap_v) not in self.textures:
-            plain = decode_texture(*self.data.image(index))
+            plain = decode_texture(*self.data.image(index), self.data.folder.max_texture_pixels)
             self.textures[index, wrap_u, wrap_v] = dataclasses.replace(plain, wrap_u=wrap_u, wrap_v=wrap_v)
         return self.textures[index, wrap_u, wrap_v]
 

@@ -6,7 +6,7 @@ import hashlib
 import os
 import re
 from collections import OrderedDict
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from pathlib import Path
 from threading import Lock
@@ -39,16 +39,23 @@ class SceneLibrary:
         folder: holds one folder for each scene, named by its id, with a scene.toml in it; None for none.
             Nothing outside it is opened.
         max_bytes: bound on all prepared scenes kept, by their `nbytes`; the last one used is always kept.
+        read: reads the scene of a folder, which messages call by the name given; None: in this process.
 
     Raises:
         SceneError: for a folder that does not exist.
     """
 
-    def __init__(self, folder: Path | None = None, max_bytes: int = DEFAULT_MAX_BYTES) -> None:
+    def __init__(
+        self,
+        folder: Path | None = None,
+        max_bytes: int = DEFAULT_MAX_BYTES,
+        read: Callable[[Path, str], Scene] | None = None,
+    ) -> None:
         if folder is not None and not folder.is_dir():
             raise SceneError(f"{folder}: expected a folder of scenes, found none")
         self._folder = None if folder is None else folder.resolve()
         self._max_bytes = max_bytes
+        self._read = read or _read_here
         self._lock = Lock()
         self._ready: OrderedDict[str, tuple[str, PreparedScene]] = OrderedDict()
         self._broken: dict[str, tuple[str, str]] = {}
@@ -135,7 +142,7 @@ class SceneLibrary:
     def _scene(self, scene_id: str) -> Scene:
         place = self._place(scene_id)
         if place is not None:
-            return load_scene_folder(place, label=scene_id)
+            return self._read(place, scene_id)
         if scene_id not in BUILT_IN:
             raise UnknownScene(scene_id, self.ids())
         return BUILT_IN[scene_id]()
@@ -147,6 +154,10 @@ class SceneLibrary:
         while total > self._max_bytes and len(self._ready) > 1:
             _, (_, dropped) = self._ready.popitem(last=False)
             total -= dropped.nbytes
+
+
+def _read_here(place: Path, label: str) -> Scene:
+    return load_scene_folder(place, label=label)
 
 
 def _listing(place: Path, scene_id: str) -> Iterator[str]:

@@ -96,7 +96,7 @@ class _Reader:
         data, inner = self.folder.read(name, where, self.inner)
         if (inner, clamped) not in self.textures:
             wrap = "clamp" if clamped else "repeat"
-            texture = decode_texture(data, self.folder.file_label(inner))
+            texture = decode_texture(data, self.folder.file_label(inner), self.folder.max_texture_pixels)
             self.textures[inner, clamped] = dataclasses.replace(texture, wrap_u=wrap, wrap_v=wrap)
         return self.textures[inner, clamped]
 

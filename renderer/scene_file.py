@@ -107,7 +107,7 @@ from numpy.typing import NDArray
 
 from renderer.camera import MAX_POSITION_M, Camera
 from renderer.camera_path import read_camera_path
-from renderer.codec import decode_texture
+from renderer.codec import MAX_TEXTURE_PIXELS, decode_texture
 from renderer.errors import SettingsError
 from renderer.fields import Fields
 from renderer.folder import MAX_FILE_BYTES, Folder
@@ -149,7 +149,12 @@ _DEFAULTS: Final = Material()
 
 
 def load_scene_folder(
-    folder: Path, *, label: str | None = None, max_bytes: int = MAX_FILE_BYTES, max_triangles: int = MAX_TRIANGLES
+    folder: Path,
+    *,
+    label: str | None = None,
+    max_bytes: int = MAX_FILE_BYTES,
+    max_triangles: int = MAX_TRIANGLES,
+    max_texture_pixels: int = MAX_TEXTURE_PIXELS,
 ) -> Scene:
     """The scene that `folder`/scene.toml describes.
 
@@ -158,11 +163,12 @@ def load_scene_folder(
         label: what messages call it; its path unless given.
         max_bytes: refuse larger files, each.
         max_triangles: refuse more triangles, of all meshes together.
+        max_texture_pixels: refuse images of more pixels, each.
 
     Raises:
         SceneError: "folder/scene.toml: field: expected ..., found ...", or the same of a file it names.
     """
-    tree = Folder(folder.resolve(), str(folder) if label is None else label, max_bytes)
+    tree = Folder(folder.resolve(), str(folder) if label is None else label, max_bytes, max_texture_pixels)
     file = tree.file_label(SCENE_FILE)
     data, _ = tree.read(SCENE_FILE, file)
     return _Reader(tree, max_triangles).scene(Fields(read_toml(data, file), file))
@@ -253,7 +259,7 @@ class _Reader:
         wrap_u, wrap_v = (table.choice(side, WRAPS, "repeat") for side in ("wrap_u", "wrap_v"))
         table.refuse_unknown()
         if (inner, wrap_u, wrap_v) not in self.textures:
-            plain = decode_texture(data, self.folder.file_label(inner))
+            plain = decode_texture(data, self.folder.file_label(inner), self.folder.max_texture_pixels)
             self.textures[inner, wrap_u, wrap_v] = dataclasses.replace(plain, wrap_u=wrap_u, wrap_v=wrap_v)
         return self.textures[inner, wrap_u, wrap_v]
 

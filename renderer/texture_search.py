@@ -51,7 +51,7 @@ class TextureSearch:
             except SceneError:
                 continue
             try:
-                return decode_texture(data, self.folder.file_label(inner))
+                return decode_texture(data, self.folder.file_label(inner), self.folder.max_texture_pixels)
             except SceneError as error:
                 self.notes.append(f"texture left out: {error}")
                 return None

@@ -20,6 +20,7 @@ from service.catalogue import Catalogue
 from service.desk import Desk
 from service.headers import SafeHeaders
 from service.jobs import JobQueue
+from service.loader import Loader
 from service.metrics import Metrics
 from service.openapi import describe_api
 from service.problem import answer_errors
@@ -43,6 +44,7 @@ def create_app(
     announce: Callable[[str], None] = log.info,
     clock: Callable[[], int] = time.monotonic_ns,
     survey: Survey | None = None,
+    crashes: int = 0,
 ) -> FastAPI:
     """The application.
 
@@ -52,13 +54,15 @@ def create_app(
         announce: receives a line when the kernels begin to compile and one when frames can be rendered.
         clock: of the sessions, monotonic [ns].
         survey: what is measured of a scene in idle time; None for the usual.
+        crashes: how often native code brought this service down before.
     """
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         own = renderer or Renderer(settings.threads, settings.map_cache_bytes, settings.store_bytes)
-        library = SceneLibrary(settings.scenes, settings.scene_bytes)
-        studio = Studio(settings, own, library, Metrics())
+        loader = Loader(settings)
+        library = SceneLibrary(settings.scenes, settings.scene_bytes, loader.read)
+        studio = Studio(settings, own, library, Metrics(crashes))
         desk = Desk(
             studio,
             Catalogue(library),
@@ -73,6 +77,7 @@ def create_app(
         yield
         desk.studio.close()
         desk.sessions.close()
+        loader.close()
         await asyncio.to_thread(desk.surveyor.close)
         desk.renders.close()
         desk.lookups.close()

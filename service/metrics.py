@@ -39,9 +39,13 @@ class Now:
 
 
 class Metrics:
-    """The counters of one service; any thread may count."""
+    """The counters of one service; any thread may count.
 
-    def __init__(self) -> None:
+    Args:
+        crashes: how often native code brought this service down before.
+    """
+
+    def __init__(self, crashes: int = 0) -> None:
         self._registry = CollectorRegistry()
         self._frames = self._counter("frames", "Frames rendered, by who asked.", "via")
         self._rays = self._counter("rays", "Rays traced, by kind.", "kind")
@@ -55,6 +59,9 @@ class Metrics:
         self._superseded = self._counter("superseded_gazes", "Gazes that a newer one replaced unrendered.")
         self._dropped = self._counter("dropped_frames", "Frames that a viewer missed since it was not ready.")
         self._refused = self._counter("refusals", "Requests and clients of streams refused, by kind.", "via", "kind")
+        self._gauge("crashes", "How often this service was started again since native code brought it down.").set(
+            crashes
+        )
         self._stages = self._histogram("stage_seconds", "Time of each stage of a frame.", "stage")
         self._latency = self._histogram(
             "gaze_to_frame_seconds", "From the arrival of a gaze to the encoded frame that follows a move of it."

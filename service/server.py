@@ -1,14 +1,14 @@
-"""The service as a process: a socket, uvicorn, and a word on how to use it."""
+"""The service on a socket: uvicorn, and how it ends."""
 
 from __future__ import annotations
 
+import contextlib
 import socket
 from collections.abc import Callable
 
 import uvicorn
 from fastapi import FastAPI
 
-from renderer.errors import SettingsError
 from service.app import create_app
 from service.connection import connection_of
 from service.settings import Settings
@@ -19,30 +19,19 @@ GOODBYE_S = 5
 PING_S = 20.0
 """How often a stream's client is asked whether it is still there, and how long it may take to answer [s]."""
 
-BACKLOG = 128
 
-
-def serve(settings: Settings, announce: Callable[[str], None]) -> None:
+def run(settings: Settings, listener: socket.socket, announce: Callable[[str], None], crashes: int = 0) -> None:
     """Serve until stopped (Ctrl-C or SIGTERM).
 
     Args:
-        settings: address, limits and access.
-        announce: receives lines for people: the address, how to ask for a frame, when it is ready.
-
-    Raises:
-        SettingsError: if the address cannot be listened on.
+        settings: limits and access.
+        listener: where clients connect.
+        announce: receives a line when the kernels begin to compile and one when frames can be rendered.
+        crashes: how often native code brought this service down before.
     """
-    with listen(settings) as listener:
-        address = address_of(settings, listener)
-        announce(f"gazetrace serves on {address}")
-        token = ' -H "Authorization: Bearer $GAZETRACE_TOKEN"' if settings.token is not None else ""
-        announce(f"a page to look with: {address}/    the API: {address}/docs    a frame:")
-        announce(f'curl{token} -o frame.png "{address}/v1/scenes/spheres/frame?gaze_x=0.5&gaze_y=0.5&unit=fraction"')
-        server = Server(create_app(settings, announce=announce), settings)
-        try:
-            server.run(sockets=[listener])
-        except KeyboardInterrupt:
-            announce("stopped")
+    server = Server(create_app(settings, announce=announce, crashes=crashes), settings)
+    with contextlib.suppress(KeyboardInterrupt):
+        server.run(sockets=[listener])
 
 
 class Server(uvicorn.Server):
@@ -81,28 +70,3 @@ def server_config(app: FastAPI, settings: Settings) -> uvicorn.Config:
         ssl_certfile=settings.certfile,
         ssl_keyfile=settings.keyfile,
     )
-
-
-def listen(settings: Settings) -> socket.socket:
-    """A socket that listens on the settings' address.
-
-    Raises:
-        SettingsError: if it cannot.
-    """
-    try:
-        family, _, _, _, address = socket.getaddrinfo(
-            settings.host, settings.port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
-        )[0]
-        return socket.create_server(address[:2], family=family, backlog=BACKLOG)
-    except (OSError, UnicodeError) as error:
-        found = f"{settings.host}:{settings.port} ({getattr(error, 'strerror', None) or error})"
-        raise SettingsError("host and port", "an address to listen on", found) from None
-
-
-def address_of(settings: Settings, listener: socket.socket) -> str:
-    """The URL of the service, for people on this machine."""
-    port = listener.getsockname()[1]
-    host = {"0.0.0.0": "127.0.0.1", "::": "[::1]", "": "127.0.0.1"}.get(settings.host, settings.host)
-    if ":" in host and not host.startswith("["):
-        host = f"[{host}]"
-    return f"{'http' if settings.certfile is None else 'https'}://{host}:{port}"

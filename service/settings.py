@@ -32,6 +32,7 @@ LEAST_HEADER_BYTES, MOST_HEADER_BYTES = 1024, 1 << 20
 MOST_CONNECTIONS = 65_536
 MOST_MESSAGES_PER_S = 1_000_000
 LONGEST_CLIENT_TIMEOUT_S = 3600
+LONGEST_LOAD_S = 24 * 3600
 LONGEST_EXPIRY_S = 7 * 24 * 3600
 
 
@@ -69,6 +70,11 @@ class Settings:
         map_cache_bytes: memory for cell maps.
         store_bytes: memory for samples of earlier frames.
         scene_bytes: memory for loaded scenes.
+        max_scene_file_bytes: largest file of a scene in the scenes folder.
+        max_triangles: most triangles of such a scene.
+        max_texture_pixels: most pixels of a picture on its surfaces.
+        max_load_s: how long reading such a scene may take [s].
+        max_load_bytes: memory that reading such a scene may take.
         allowed_hosts: further names this service goes by, for a proxy in front of it; `*` for any.
         allowed_origins: origins, such as `https://lab.example`, whose pages may use it from a browser.
 
@@ -105,6 +111,11 @@ class Settings:
     map_cache_bytes: int = 256 << 20
     store_bytes: int = 512 << 20
     scene_bytes: int = 1 << 30
+    max_scene_file_bytes: int = 1 << 30
+    max_triangles: int = 20_000_000
+    max_texture_pixels: int = 1 << 26
+    max_load_s: int = 120
+    max_load_bytes: int = 4 << 30
     allowed_hosts: tuple[str, ...] = ()
     allowed_origins: tuple[str, ...] = ()
 
@@ -129,8 +140,11 @@ class Settings:
         require_integer("max_message_bytes", self.max_message_bytes, LEAST_MESSAGE_BYTES, MAX_TEXT_BYTES)
         require_integer("max_messages_per_s", self.max_messages_per_s, 1, MOST_MESSAGES_PER_S)
         require_integer("session_expiry_s", self.session_expiry_s, 0, LONGEST_EXPIRY_S)
+        require_integer("max_load_s", self.max_load_s, 1, LONGEST_LOAD_S)
         for name in ("map_cache_bytes", "store_bytes", "scene_bytes"):
             require_integer(name, getattr(self, name), 0, MOST_BYTES)
+        for name in ("max_scene_file_bytes", "max_triangles", "max_texture_pixels", "max_load_bytes"):
+            require_integer(name, getattr(self, name), 1, MOST_BYTES)
         if self.scenes is not None and not os.path.isdir(self.scenes):
             raise SettingsError("scenes", "a folder", str(self.scenes))
         for origin in self.allowed_origins:
@@ -189,6 +203,12 @@ class Settings:
         except SettingsError as error:
             raise SettingsError(VARIABLE_PREFIX + error.field.upper(), error.expected, error.found) from None
 
+    def to_environment(self) -> dict[str, str]:
+        """The variables from which `from_environment` makes the same settings."""
+        return {
+            VARIABLE_PREFIX + setting.name.upper(): _written(getattr(self, setting.name)) for setting in fields(self)
+        }
+
 
 def is_loopback(host: str) -> bool:
     """Whether `host` (a name or an address, no port) is this machine as seen from itself."""
@@ -231,6 +251,13 @@ def _path(_: str, text: str) -> Path:
 
 def _list(_: str, text: str) -> tuple[str, ...]:
     return tuple(part.strip() for part in text.split(",") if part.strip())
+
+
+def _written(value: object) -> str:
+    """A setting as the text of a variable; nothing for None."""
+    if value is None or isinstance(value, tuple):
+        return ",".join(value or ())
+    return str(int(value)) if isinstance(value, bool) else str(value)
 
 
 _READ: Mapping[str, Callable[[str, str], object]] = {

@@ -23,7 +23,7 @@ class OwnService:
 
     Attributes:
         url: where it listens.
-        process: its number.
+        process: number of the process that renders.
     """
 
     url: str
@@ -61,9 +61,15 @@ def own_service_process(flags: Sequence[str], variables: Mapping[str, str]) -> I
     words = [sys.executable, "-P", "-m", "clients.command_line", "serve", "--port", "0", *flags]
     with subprocess.Popen(words, env=environ, stdout=subprocess.PIPE, text=True) as process:
         try:
-            yield OwnService(_address(process), process.pid)
+            yield OwnService(_address(process), _working(process.pid))
         finally:
             process.terminate()
+
+
+def _working(process: int) -> int:
+    """The process that a service has started to do its work; itself where Linux does not tell."""
+    children = Path(f"/proc/{process}/task/{process}/children")
+    return int(children.read_text().split()[0]) if children.exists() else process
 
 
 def _address(process: subprocess.Popen[str]) -> str:

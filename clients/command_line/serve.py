@@ -59,11 +59,9 @@ def add(commands: argparse._SubParsersAction[Any]) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Serve until stopped."""
     settings = settings_of(arguments, os.environ)
-    from service.request_log import configure_logging
-    from service.server import serve
+    from service.supervisor import serve
 
-    configure_logging(settings.log_json, arguments.debug)
-    serve(settings, announce)
+    serve(settings, announce, debug=arguments.debug)
     return OK
 
 

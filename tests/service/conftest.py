@@ -13,7 +13,8 @@ import pytest
 
 from renderer.pipeline import Renderer
 from service.app import create_app
-from service.server import Server, address_of, listen
+from service.listener import address_of, listen
+from service.server import Server
 from service.settings import Settings
 from service.survey import Survey
 

@@ -44,6 +44,7 @@ class ServiceProcess:
         assert any(line.startswith("ready in ") for line in self.lines), self.lines
 
     def signal(self, number: signal.Signals) -> None:
+        """Send one to the process that was started."""
         self._process.send_signal(number)
 
     def ended(self) -> int:
@@ -65,7 +66,15 @@ class ServiceProcess:
 
     @property
     def pid(self) -> int:
-        return self._process.pid
+        """The process that works: the one that was started looks after it."""
+        main = self._process.pid
+        return int(Path(f"/proc/{main}/task/{main}/children").read_text().split()[0])
+
+    @property
+    def children(self) -> list[int]:
+        """Processes that it has started and that have not ended."""
+        lists = [(task / "children").read_text().split() for task in self._proc("task").iterdir()]
+        return [int(child) for children in lists for child in children]
 
     @property
     def address_space_bytes(self) -> int:
@@ -88,7 +97,7 @@ class ServiceProcess:
         return len(list(self._proc("task").iterdir()))
 
     def _proc(self, name: str) -> Path:
-        return Path("/proc", str(self._process.pid), name)
+        return Path("/proc", str(self.pid), name)
 
     def _read(self) -> None:
         assert self._process.stdout is not None

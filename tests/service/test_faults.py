@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import asyncio
+import os
 import resource
 import signal
 import socket
 import time
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import httpx
 
@@ -108,3 +111,56 @@ def test_a_display_resumes_its_session_with_a_service_that_was_killed_and_starte
                 second.stop()
 
     asyncio.run(asyncio.wait_for(work(), 2 * PATIENCE_S))
+
+
+def test_a_native_crash_costs_the_frame_in_flight_and_nothing_else() -> None:
+    """The service is started again; who asks meanwhile waits, a display and a gaze source come back and go on."""
+
+    async def work(service: ServiceProcess) -> None:
+        async with Display(service.address, session="lab", patience_s=PATIENCE_S) as display:
+            await display.configure("matte", display={"width_px": 64, "height_px": 36})
+            display.look_at(10, 20)
+            while (await display.next_frame()).header.phase != "final":
+                pass
+            crashed = service.pid
+            os.kill(crashed, signal.SIGSEGV)
+            while Path(f"/proc/{crashed}").exists():
+                await asyncio.sleep(0)
+            waited = await asyncio.to_thread(httpx.get, f"{service.address}/healthz", timeout=PATIENCE_S)
+            assert waited.status_code == 200
+            seq = display.look_at(50, 20)
+            while True:
+                last = (await display.next_frame()).header
+                if last.phase == "final" and last.gaze is not None and last.gaze.seq == seq:
+                    break
+            assert (last.session, last.scene, last.width) == ("lab", "matte", 64)
+            assert service.pid != crashed
+
+    with service_process("--threads", "1", "--log-json") as service:
+        asyncio.run(asyncio.wait_for(work(service), 2 * PATIENCE_S))
+        assert "gazetrace_crashes 1.0" in httpx.get(f"{service.address}/metrics").text
+        assert frame(service, SMALL).status_code == 200
+        service.signal(signal.SIGTERM)
+        assert service.ended() == -signal.SIGTERM
+    assert [line for line in service.lines if "SIGSEGV ended this service, which is started again: crash 1" in line]
+
+
+def test_a_crash_while_a_scene_is_read_is_an_error_of_that_scene(tmp_path: Path) -> None:
+    scene = tmp_path / "lab" / "scene.toml"
+    scene.parent.mkdir()
+    scene.write_text("[[sphere]]\ncenter = [0, 0, 0]\nradius = 1\n")
+    with service_process("--threads", "1", "--scenes-folder", str(tmp_path)) as service, ThreadPoolExecutor(1) as other:
+        path = f"{service.address}/v1/scenes/lab/frame"
+        reply = other.submit(lambda: httpx.get(path, params=SMALL, timeout=PATIENCE_S))
+        while not (readers := service.children):
+            assert not reply.done()
+        os.kill(readers[0], signal.SIGSTOP)
+        assert frame(service, SMALL).status_code == 200
+        os.kill(readers[0], signal.SIGSEGV)
+        os.kill(readers[0], signal.SIGCONT)
+        refused = reply.result(PATIENCE_S)
+        assert (refused.status_code, refused.json()["type"]) == (422, "urn:gazetrace:problem:broken-scene")
+        assert "ends in SIGSEGV" in refused.json()["detail"]
+        os.utime(scene)
+        assert httpx.get(path, params=SMALL, timeout=PATIENCE_S).status_code == 200
+        assert "gazetrace_crashes 0.0" in httpx.get(f"{service.address}/metrics").text

@@ -17,14 +17,15 @@ import httpx
 import pytest
 
 from renderer.errors import SettingsError
-from service.server import address_of, listen, serve
+from service.listener import address_of, listen
 from service.settings import Settings
+from service.supervisor import serve
 from tests.service.conftest import PATIENCE_S
 
 SERVE = """
 import os
-from service.server import serve
 from service.settings import Settings
+from service.supervisor import serve
 
 serve(Settings.from_environment(os.environ), lambda line: print(line, flush=True))
 """

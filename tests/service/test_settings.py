@@ -38,6 +38,11 @@ STATED = {
     "map_cache_bytes": ("1", 1),
     "store_bytes": ("2", 2),
     "scene_bytes": ("3", 3),
+    "max_scene_file_bytes": ("4", 4),
+    "max_triangles": ("5", 5),
+    "max_texture_pixels": ("6", 6),
+    "max_load_s": ("7", 7),
+    "max_load_bytes": ("8", 8),
     "allowed_hosts": ("render.example, lab", ("render.example", "lab")),
     "allowed_origins": ("https://lab.example", ("https://lab.example",)),
 }
@@ -55,6 +60,11 @@ def test_every_field_has_a_variable(tmp_path: Path) -> None:
         assert getattr(settings, name) == value, name
     for name, path in paths.items():
         assert getattr(settings, name) == path
+    assert Settings.from_environment(settings.to_environment()) == settings
+
+
+def test_the_defaults_survive_the_way_through_the_environment() -> None:
+    assert Settings.from_environment(Settings().to_environment()) == Settings()
 
 
 def test_empty_and_foreign_variables_state_nothing() -> None:
@@ -89,6 +99,11 @@ def test_empty_and_foreign_variables_state_nothing() -> None:
         ("GAZETRACE_MAX_MESSAGE_BYTES", "65537"),
         ("GAZETRACE_SESSION_EXPIRY_S", "-1"),
         ("GAZETRACE_STORE_BYTES", "-1"),
+        ("GAZETRACE_MAX_SCENE_FILE_BYTES", "0"),
+        ("GAZETRACE_MAX_TRIANGLES", "0"),
+        ("GAZETRACE_MAX_TEXTURE_PIXELS", "0"),
+        ("GAZETRACE_MAX_LOAD_S", "0"),
+        ("GAZETRACE_MAX_LOAD_BYTES", "0"),
         ("GAZETRACE_INSECURE", "maybe"),
         ("GAZETRACE_SCENES", "/no/such/folder"),
         ("GAZETRACE_TOKEN", "short"),

@@ -1,0 +1,45 @@
+"""The process in which a service works, started by `supervisor`: `python -m service SOCKET CRASHES SIGNAL`."""
+
+from __future__ import annotations
+
+import faulthandler
+import logging
+import os
+import signal
+import socket
+import sys
+import threading
+
+from service.request_log import configure_logging
+from service.server import run
+from service.settings import Settings
+
+log = logging.getLogger("service")
+
+
+def main(words: list[str]) -> None:
+    """Serve on the socket of a descriptor, with the settings of the environment, until stopped."""
+    threading.Thread(target=_end_with_parent, name="gazetrace-lifeline", daemon=True).start()
+    faulthandler.enable()
+    settings = Settings.from_environment(os.environ)
+    configure_logging(settings.log_json, "--debug" in words)
+    crashes, ended_by = int(words[1]), words[2]
+    if crashes:
+        log.error("%s ended this service, which is started again: crash %d", ended_by, crashes)
+    with socket.socket(fileno=int(words[0])) as listener:
+        run(settings, listener, _announce, crashes)
+
+
+def _announce(line: str) -> None:
+    sys.stdout.write(line + "\n")
+    sys.stdout.flush()
+
+
+def _end_with_parent() -> None:
+    """Standard input ends with the process that holds its other end, be it killed: nobody would stop this one then."""
+    sys.stdin.buffer.read()
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
