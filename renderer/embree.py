@@ -108,6 +108,26 @@ class Packets(NamedTuple):
     keep_nearest: int
 
 
+class Packet(NamedTuple):
+    """Room for rays that are searched together, and for what they met.
+
+    Attributes:
+        width: how many.
+        rows: (PACKET_ROWS * width,) float32 as Embree lays them out.
+        words: the same memory read as int32.
+        valid: (width,) int32, -1 for the lanes in use.
+        distances: (CONTEXT_WORDS,) float32 context of their query.
+        numbers: the same memory read as int32.
+    """
+
+    width: int
+    rows: NDArray[np.float32]
+    words: NDArray[np.int32]
+    valid: NDArray[np.int32]
+    distances: NDArray[np.float32]
+    numbers: NDArray[np.int32]
+
+
 class EmbreeTriangles:
     """Triangles and their search tree; any number of threads may ask at once."""
 
@@ -149,16 +169,15 @@ class EmbreeTriangles:
             if again and len(missed):
                 primitive[missed], distance[missed] = self._nearest_singly(origin[missed], _turned(direction[missed]))
             return primitive, distance
-        width = self._packets.width
         primitive = np.zeros(len(origin), dtype=np.int32)
         distance = np.zeros(len(origin), dtype=np.float32)
-        packet, valid, context = _aligned(PACKET_ROWS * width), _aligned(width), _aligned(CONTEXT_WORDS)
+        packet = _packet(self._packets.width)
         singly, together = (
-            _query(INVOKE_FILTER | flag, context.ctypes.data, self._packets.keep_nearest) for flag in (0, COHERENT)
+            _query(INVOKE_FILTER | flag, packet.distances.ctypes.data, self._packets.keep_nearest)
+            for flag in (0, COHERENT)
         )
         _trace_nearest(
-            self._packets.intersect, self._scene, singly, together, coherent, again, width,
-            packet, packet.view(np.int32), valid.view(np.int32), context, context.view(np.int32),
+            self._packets.intersect, self._scene, singly, together, coherent, again, packet,
             origin, direction, primitive, distance,
         )  # fmt: skip
         return primitive, distance
@@ -189,12 +208,10 @@ class EmbreeTriangles:
             # Embree answers 0 for a blocked ray and -1 for a clear one.
             np.equal(self.yardstick.run(origin, direction, reach, "OCCLUDED"), 0, out=blocked.view(np.bool_))
             return
-        width = self._packets.width
-        packet, valid = _aligned(PACKET_ROWS * width), _aligned(width)
         singly, together = _query(0, 0, 0), _query(COHERENT, 0, 0)
         _trace_occluded(
-            self._packets.occluded, self._scene, singly, together if coherent else singly, width,
-            packet, packet.view(np.int32), valid.view(np.int32), origin, direction, reach, blocked,
+            self._packets.occluded, self._scene, singly, together if coherent else singly,
+            _packet(self._packets.width), origin, direction, reach, blocked,
         )  # fmt: skip
 
 
@@ -344,6 +361,12 @@ def _aligned(words: int) -> NDArray[np.float32]:
     return raw[start : start + 4 * words].view(np.float32)
 
 
+def _packet(width: int) -> Packet:
+    """An empty packet of `width` rays."""
+    rows, valid, distances = _aligned(PACKET_ROWS * width), _aligned(width), _aligned(CONTEXT_WORDS)
+    return Packet(width, rows, rows.view(np.int32), valid.view(np.int32), distances, distances.view(np.int32))
+
+
 def _keeper(width: int) -> Callable[[Any], None]:
     """The filter of packets of `width` rays."""
 
@@ -378,9 +401,7 @@ def _keeper(width: int) -> Callable[[Any], None]:
 
 @formula
 def _load_ray(
-    packet: NDArray[np.float32],
-    words: NDArray[np.int32],
-    width: int,
+    packet: Packet,
     lane: int,
     origin: NDArray[np.float32],
     direction: NDArray[np.float32],
@@ -388,14 +409,15 @@ def _load_ray(
     reach: np.float32,
 ) -> bool:
     """Put one ray into a lane of a packet; True if it is parallel to a coordinate plane."""
+    width, rows, words = packet.width, packet.rows, packet.words
     largest, smallest = np.float32(0.0), np.float32(np.inf)
     for axis in range(3):
-        packet[(ORIGIN + axis) * width + lane] = origin[ray, axis]
-        packet[(DIRECTION + axis) * width + lane] = direction[ray, axis]
+        rows[(ORIGIN + axis) * width + lane] = origin[ray, axis]
+        rows[(DIRECTION + axis) * width + lane] = direction[ray, axis]
         largest, smallest = max(largest, abs(direction[ray, axis])), min(smallest, abs(direction[ray, axis]))
-    packet[NEAR * width + lane] = 0.0
-    packet[TIME * width + lane] = 0.0
-    packet[FAR * width + lane] = reach
+    rows[NEAR * width + lane] = 0.0
+    rows[TIME * width + lane] = 0.0
+    rows[FAR * width + lane] = reach
     words[MASK * width + lane] = -1
     words[FLAGS * width + lane] = 0
     words[(HIT + PRIMITIVE) * width + lane] = -1
@@ -404,16 +426,17 @@ def _load_ray(
 
 
 @formula
-def _turn_aside(packet: NDArray[np.float32], width: int, lane: int) -> None:
+def _turn_aside(packet: Packet, lane: int) -> None:
     """Turn the direction in a lane of a packet by ASIDE, along the axis that it has least of."""
+    width, rows = packet.width, packet.rows
     largest, smallest, across = np.float32(0.0), np.float32(np.inf), DIRECTION * width + lane
     for axis in range(3):
         row = (DIRECTION + axis) * width + lane
-        part = abs(packet[row])
+        part = abs(rows[row])
         largest = max(largest, part)
         if part < smallest:
             smallest, across = part, row
-    packet[across] += math.copysign(ASIDE * largest, packet[across])
+    rows[across] += math.copysign(ASIDE * largest, rows[across])
 
 
 def _turned(direction: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -432,30 +455,20 @@ def _trace_nearest(
     together: NDArray[np.int64],
     coherent: bool,
     again: bool,
-    width: int,
-    packet: NDArray[np.float32],
-    words: NDArray[np.int32],
-    valid: NDArray[np.int32],
-    distances: NDArray[np.float32],
-    numbers: NDArray[np.int32],
+    packet: Packet,
     origin: NDArray[np.float32],
     direction: NDArray[np.float32],
     primitive: NDArray[np.int32],
     distance: NDArray[np.float32],
 ) -> None:
-    """Trace rays `width` at a time, those that met nothing `again`, turned aside.
-
-    `words` is `packet` read as integers, `numbers` and `distances` are the context.
-    """
+    """Trace rays a packet at a time, those that met nothing `again`, turned aside."""
+    width, distances, numbers = packet.width, packet.distances, packet.numbers
     for first in range(0, len(primitive), width):
         count = min(width, len(primitive) - first)
         for lane in range(count):
             distances[DISTANCES + lane], numbers[NUMBERS + lane] = np.inf, -1
         for turned in range(2 if again else 1):
-            _search(
-                intersect, scene, singly, together, coherent, width, packet, words, valid, distances, numbers,
-                origin, direction, first, count, turned == 1,
-            )  # fmt: skip
+            _search(intersect, scene, singly, together, coherent, packet, origin, direction, first, count, turned == 1)
         for lane in range(count):
             primitive[first + lane] = numbers[NUMBERS + lane]
             distance[first + lane] = distances[DISTANCES + lane]
@@ -468,12 +481,7 @@ def _search(
     singly: NDArray[np.int64],
     together: NDArray[np.int64],
     coherent: bool,
-    width: int,
-    packet: NDArray[np.float32],
-    words: NDArray[np.int32],
-    valid: NDArray[np.int32],
-    distances: NDArray[np.float32],
-    numbers: NDArray[np.int32],
+    packet: Packet,
     origin: NDArray[np.float32],
     direction: NDArray[np.float32],
     first: int,
@@ -481,32 +489,33 @@ def _search(
     turned: bool,
 ) -> None:
     """Search along the rays of a packet that have met nothing yet, as they are or `turned` aside."""
+    width, valid, distances, numbers = packet.width, packet.valid, packet.distances, packet.numbers
     parallel = waiting = False
     for lane in range(width):
         valid[lane] = -1 if lane < count and numbers[NUMBERS + lane] < 0 else 0
         if valid[lane] != 0:
             waiting = True
-            parallel |= _load_ray(packet, words, width, lane, origin, direction, first + lane, np.float32(np.inf))
+            parallel |= _load_ray(packet, lane, origin, direction, first + lane, np.float32(np.inf))
             if turned:
-                _turn_aside(packet, width, lane)
+                _turn_aside(packet, lane)
             distances[MARGINS + lane] = np.inf
     if not waiting:
         return
     packed = coherent and not parallel
     query = together if packed else singly
-    call(intersect, valid.ctypes.data, scene, packet.ctypes.data, query.ctypes.data)
+    call(intersect, valid.ctypes.data, scene, packet.rows.ctypes.data, query.ctypes.data)
     doubtful = False
     for lane in range(count if packed else 0):
         near_edge = valid[lane] != 0 and distances[MARGINS + lane] < NEAR_EDGE
         valid[lane] = -1 if near_edge else 0
         if near_edge:
             doubtful = True
-            _load_ray(packet, words, width, lane, origin, direction, first + lane, np.float32(np.inf))
+            _load_ray(packet, lane, origin, direction, first + lane, np.float32(np.inf))
             if turned:
-                _turn_aside(packet, width, lane)
+                _turn_aside(packet, lane)
             distances[DISTANCES + lane], numbers[NUMBERS + lane] = np.inf, -1
     if doubtful:
-        call(intersect, valid.ctypes.data, scene, packet.ctypes.data, singly.ctypes.data)
+        call(intersect, valid.ctypes.data, scene, packet.rows.ctypes.data, singly.ctypes.data)
 
 
 @kernel
@@ -515,24 +524,22 @@ def _trace_occluded(
     scene: int,
     singly: NDArray[np.int64],
     together: NDArray[np.int64],
-    width: int,
-    packet: NDArray[np.float32],
-    words: NDArray[np.int32],
-    valid: NDArray[np.int32],
+    packet: Packet,
     origin: NDArray[np.float32],
     direction: NDArray[np.float32],
     reach: NDArray[np.float32],
     blocked: NDArray[np.uint8],
 ) -> None:
-    """Trace shadow rays `width` at a time; Embree sets the reach of a blocked one to minus infinity."""
+    """Trace shadow rays a packet at a time; Embree sets the reach of a blocked one to minus infinity."""
+    width, valid, rows = packet.width, packet.valid, packet.rows
     for first in range(0, len(blocked), width):
         count = min(width, len(blocked) - first)
         query = together
         for lane in range(width):
             valid[lane] = -1 if lane < count else 0
         for lane in range(count):
-            if _load_ray(packet, words, width, lane, origin, direction, first + lane, reach[first + lane]):
+            if _load_ray(packet, lane, origin, direction, first + lane, reach[first + lane]):
                 query = singly
-        call(occluded, valid.ctypes.data, scene, packet.ctypes.data, query.ctypes.data)
+        call(occluded, valid.ctypes.data, scene, rows.ctypes.data, query.ctypes.data)
         for lane in range(count):
-            blocked[first + lane] = 1 if packet[FAR * width + lane] == -np.inf else 0
+            blocked[first + lane] = 1 if rows[FAR * width + lane] == -np.inf else 0

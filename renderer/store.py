@@ -38,7 +38,7 @@ ABANDON_POLL_S = 0.005
 
 
 class Samples(NamedTuple):
-    """What is known of cells, one slot each.
+    """What is known of cells, one slot each; the sums of a cell without samples are anything.
 
     Attributes:
         total: (n, 3) float32 sum of the radiance of its samples.
@@ -88,9 +88,9 @@ class SampleStore:
             settled=np.zeros(decided, dtype=np.uint8),
         )
         self.samples = Samples(
-            total=np.zeros((slots, 3), dtype=np.float32),
-            shown=np.zeros(slots, dtype=np.float32),
-            square=np.zeros(slots, dtype=np.float32),
+            total=np.empty((slots, 3), dtype=np.float32),
+            shown=np.empty(slots, dtype=np.float32),
+            square=np.empty(slots, dtype=np.float32),
             number=np.zeros(slots, dtype=np.int32),
         )
 
@@ -314,8 +314,10 @@ def add_samples(
     row = 0
     for index in range(len(cells)):
         slot = slots[cells[index]]
-        red, green, blue = total[slot, 0], total[slot, 1], total[slot, 2]
-        bright, bright_square = shown[slot], shown_squares[slot]
+        red = green = blue = bright = bright_square = np.float32(0.0)
+        if count[slot] > 0:
+            red, green, blue = total[slot, 0], total[slot, 1], total[slot, 2]
+            bright, bright_square = shown[slot], shown_squares[slot]
         square = squares[slot] if decided else np.float32(0.0)
         for sample in range(count[slot], until[index]):
             r, g, b = radiance[row, 0], radiance[row, 1], radiance[row, 2]

@@ -91,6 +91,8 @@ def test_scanline_cells_have_places_of_their_map_only(renderer: Renderer, pool: 
 def sample(radiance: NDArray[np.float32], *parts: int) -> SampleStore:
     """Two cells in slots 5 and 2; `radiance` is (2, n, 3), added in parts of these lengths."""
     store, slots, cells = SampleStore(7), np.array([5, 2]), np.array([0, 1], np.int32)
+    for sums in (store.samples.total, store.samples.shown, store.samples.square):
+        sums[:] = np.nan  # what a new store finds in its memory is nobody's sample
     start = 0
     for length in parts:
         part = np.ascontiguousarray(radiance[:, start : start + length]).reshape(-1, 3)
@@ -105,7 +107,7 @@ def test_sums_do_not_depend_on_the_parts_they_were_added_in() -> None:
     radiance = np.random.default_rng(0).random((2, 9, 3)).astype(np.float32)
     at_once, in_parts = sample(radiance, 9), sample(radiance, 1, 3, 5)
     for one, two in zip(at_once.samples, in_parts.samples, strict=True):
-        np.testing.assert_array_equal(one, two)
+        np.testing.assert_array_equal(one[[5, 2]], two[[5, 2]])
     np.testing.assert_allclose(at_once.samples.total[[5, 2]], radiance.sum(axis=1), rtol=1e-6)
     luminance = radiance @ np.array(LUMINANCE)
     np.testing.assert_allclose(at_once.samples.square[[5, 2]], (luminance**2).sum(axis=1), rtol=1e-5)
