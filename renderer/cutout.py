@@ -14,7 +14,7 @@ from renderer.intersection import Intersector
 from renderer.kernel import kernel
 from renderer.prepared import MATERIAL_COLUMN, Sieve, Surfaces
 from renderer.rays import Hits, ShadowRays
-from renderer.surface import sphere_surface, triangle_surface, weights_at
+from renderer.surface import surface_met
 from renderer.texture import opacity
 
 MOST_HOLES = 64
@@ -44,14 +44,14 @@ def find_holes(
         How many were found.
     """
     facets, materials = surfaces.facets, surfaces.materials
-    center, radius, sphere_material = surfaces.spheres.center, surfaces.spheres.radius, surfaces.spheres.material
+    sphere_material = surfaces.spheres.material
     texels, pictures = surfaces.textures.texels, surfaces.textures.pictures
     primitives, distance = hits.primitive, hits.distance
     triangles = len(facets)
     found = 0
     for ray in rows:
         primitive = primitives[ray]
-        if primitive < 0 or primitive >= triangles + len(radius):
+        if primitive < 0 or primitive >= triangles + len(sphere_material):
             continue
         k = primitive - triangles
         row = int(facets[primitive, MATERIAL_COLUMN]) if k < 0 else int(np.int64(sphere_material[k]))
@@ -60,11 +60,7 @@ def find_holes(
             continue
         ox, oy, oz = np.float64(origin[ray, 0]), np.float64(origin[ray, 1]), np.float64(origin[ray, 2])
         dx, dy, dz = np.float64(direction[ray, 0]), np.float64(direction[ray, 1]), np.float64(direction[ray, 2])
-        if k < 0:
-            b1, b2 = weights_at(facets, primitive, ox, oy, oz, dx, dy, dz)
-            s = triangle_surface(facets, primitive, b1, b2, dx, dy, dz)
-        else:
-            s = sphere_surface(center[k, 0], center[k, 1], center[k, 2], radius[k], row, ox, oy, oz, dx, dy, dz)
+        s, _, _ = surface_met(facets, surfaces.spheres, primitive, ox, oy, oz, dx, dy, dz)
         if opacity(texels, pictures, material.alpha_picture, s.u, s.v) >= material.alpha_cutoff:
             continue
         origin[ray, 0] = s.px - s.offset * s.gx

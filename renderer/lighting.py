@@ -51,6 +51,46 @@ def _light_to_eye(
 
 
 @formula
+def _send(
+    s: Surface,
+    tx: float,
+    ty: float,
+    tz: float,
+    reach: float,
+    red: float,
+    green: float,
+    blue: float,
+    sample: int,
+    radiance: NDArray[np.float32],
+    shadows: ShadowRays,
+    n_shadows: int,
+) -> int:
+    """Write the shadow ray that decides about a light from (tx, ty, tz) off; without reach, add the light as it is.
+
+    Returns:
+        How many shadow rays there are now.
+    """
+    if not reach > 0.0:
+        radiance[sample, 0] += red
+        radiance[sample, 1] += green
+        radiance[sample, 2] += blue
+        return n_shadows
+    away = s.offset + s.lift
+    shadows.origin[n_shadows, 0] = s.px + away * s.gx
+    shadows.origin[n_shadows, 1] = s.py + away * s.gy
+    shadows.origin[n_shadows, 2] = s.pz + away * s.gz
+    shadows.direction[n_shadows, 0] = tx - away * s.gx
+    shadows.direction[n_shadows, 1] = ty - away * s.gy
+    shadows.direction[n_shadows, 2] = tz - away * s.gz
+    shadows.reach[n_shadows] = reach
+    shadows.light[n_shadows, 0] = red
+    shadows.light[n_shadows, 1] = green
+    shadows.light[n_shadows, 2] = blue
+    shadows.sample[n_shadows] = sample
+    return n_shadows + 1
+
+
+@formula
 def light_from_points(
     s: Surface,
     material: Any,
@@ -91,25 +131,10 @@ def light_from_points(
         if not max(red, max(green, blue)) > 0.0:
             continue
         reach = 1.0 - OFFSET_ULPS * inverse * max(abs(light.x), max(abs(light.y), abs(light.z)))
-        if light.casts == 0 or not reach > 0.0:
-            radiance[sample, 0] += red
-            radiance[sample, 1] += green
-            radiance[sample, 2] += blue
-            continue
-        away = s.offset + s.lift
-        ox, oy, oz = s.px + away * s.gx, s.py + away * s.gy, s.pz + away * s.gz
-        shadows.origin[n_shadows, 0] = ox
-        shadows.origin[n_shadows, 1] = oy
-        shadows.origin[n_shadows, 2] = oz
-        shadows.direction[n_shadows, 0] = light.x - ox
-        shadows.direction[n_shadows, 1] = light.y - oy
-        shadows.direction[n_shadows, 2] = light.z - oz
-        shadows.reach[n_shadows] = reach
-        shadows.light[n_shadows, 0] = red
-        shadows.light[n_shadows, 1] = green
-        shadows.light[n_shadows, 2] = blue
-        shadows.sample[n_shadows] = sample
-        n_shadows += 1
+        tx, ty, tz = light.x - s.px, light.y - s.py, light.z - s.pz
+        n_shadows = _send(
+            s, tx, ty, tz, reach if light.casts != 0 else 0.0, red, green, blue, sample, radiance, shadows, n_shadows
+        )
     return n_shadows
 
 
@@ -170,24 +195,10 @@ def light_from_areas(
                 continue
             farthest = max(abs(s.px + tx), max(abs(s.py + ty), abs(s.pz + tz)))
             reach = 1.0 - OFFSET_ULPS * inverse * farthest
-            if light.casts == 0 or not reach > 0.0:
-                radiance[sample, 0] += red
-                radiance[sample, 1] += green
-                radiance[sample, 2] += blue
-                continue
-            away = s.offset + s.lift
-            shadows.origin[n_shadows, 0] = s.px + away * s.gx
-            shadows.origin[n_shadows, 1] = s.py + away * s.gy
-            shadows.origin[n_shadows, 2] = s.pz + away * s.gz
-            shadows.direction[n_shadows, 0] = tx - away * s.gx
-            shadows.direction[n_shadows, 1] = ty - away * s.gy
-            shadows.direction[n_shadows, 2] = tz - away * s.gz
-            shadows.reach[n_shadows] = reach
-            shadows.light[n_shadows, 0] = red
-            shadows.light[n_shadows, 1] = green
-            shadows.light[n_shadows, 2] = blue
-            shadows.sample[n_shadows] = sample
-            n_shadows += 1
+            n_shadows = _send(
+                s, tx, ty, tz, reach if light.casts != 0 else 0.0, red, green, blue,
+                sample, radiance, shadows, n_shadows,
+            )  # fmt: skip
     return n_shadows
 
 

@@ -17,7 +17,7 @@ from renderer.kernel import kernel
 from renderer.media import crossed, dominant, with_medium
 from renderer.prepared import MATERIAL_COLUMN, OTHER_COLUMN, PreparedScene, Surfaces
 from renderer.rays import Hits
-from renderer.surface import sphere_surface, triangle_surface, weights_at
+from renderer.surface import sphere_surface, surface_met
 
 MOST_HIDDEN = 64
 """Hidden boundaries that a ray passes, one behind the other; the next one counts as seen."""
@@ -58,13 +58,13 @@ def find_hidden(
         How many were found.
     """
     facets, materials = surfaces.facets, surfaces.materials
-    center, radius, sphere_material = surfaces.spheres.center, surfaces.spheres.radius, surfaces.spheres.material
+    sphere_material = surfaces.spheres.material
     primitives, distance = hits.primitive, hits.distance
     triangles = len(facets)
     found = 0
     for ray in rows:
         primitive = primitives[ray]
-        if primitive < 0 or primitive >= triangles + len(radius):
+        if primitive < 0 or primitive >= triangles + len(sphere_material):
             continue
         k = primitive - triangles
         row = int(facets[primitive, MATERIAL_COLUMN]) if k < 0 else int(np.int64(sphere_material[k]))
@@ -73,13 +73,8 @@ def find_hidden(
             continue
         ox, oy, oz = np.float64(origin[ray, 0]), np.float64(origin[ray, 1]), np.float64(origin[ray, 2])
         dx, dy, dz = np.float64(direction[ray, 0]), np.float64(direction[ray, 1]), np.float64(direction[ray, 2])
-        other = 0
-        if k < 0:
-            b1, b2 = weights_at(facets, primitive, ox, oy, oz, dx, dy, dz)
-            s = triangle_surface(facets, primitive, b1, b2, dx, dy, dz)
-            other = int(facets[primitive, OTHER_COLUMN])
-        else:
-            s = sphere_surface(center[k, 0], center[k, 1], center[k, 2], radius[k], row, ox, oy, oz, dx, dy, dz)
+        s, _, _ = surface_met(facets, surfaces.spheres, primitive, ox, oy, oz, dx, dy, dz)
+        other = int(facets[primitive, OTHER_COLUMN]) if k < 0 else 0
         if medium > 0:
             before, behind = crossed(around[ray], medium, other, s.entering)
             if not everything and dominant(before) != dominant(behind):

@@ -29,7 +29,7 @@ from renderer.normal_map import bumped, mirroring
 from renderer.prepared import DENSITY_COLUMN, OTHER_COLUMN, Surfaces
 from renderer.rays import Hits, Rays, ShadowRays
 from renderer.reflectance import even_light, towards_eye
-from renderer.surface import Surface, sphere_surface, triangle_surface, weights_at
+from renderer.surface import Surface, surface_met
 from renderer.tangent import HANDED_COLUMN
 from renderer.texture import filtered
 
@@ -102,7 +102,7 @@ def shade(
     """
     # Arrays are taken out of their records once: doing it in the loop counts references for each ray.
     facets, tangents = surfaces.facets, surfaces.tangents
-    center, radius, sphere_material = surfaces.spheres.center, surfaces.spheres.radius, surfaces.spheres.material
+    radius = surfaces.spheres.radius
     materials, around = surfaces.materials, surfaces.surroundings
     lights, area_lights = surfaces.lights, surfaces.area_lights
     texels, pictures = surfaces.textures.texels, surfaces.textures.pictures
@@ -133,27 +133,16 @@ def shade(
             radiance[sample, 1] += wg * (high * around[0, 1] + low * around[1, 1])
             radiance[sample, 2] += wb * (high * around[0, 2] + low * around[1, 2])
             continue
-        b1, b2 = 0.0, 0.0
-        if primitive < triangles:
-            b1, b2 = weights_at(
-                facets, primitive,
-                np.float64(origin[ray, 0]), np.float64(origin[ray, 1]), np.float64(origin[ray, 2]),
-                dx, dy, dz,
-            )  # fmt: skip
-            s = triangle_surface(facets, primitive, b1, b2, dx, dy, dz)
-        elif primitive >= solids:
+        if primitive >= solids:
             lamp = area_lights[primitive - solids]
             radiance[sample, 0] += wr * lamp.red
             radiance[sample, 1] += wg * lamp.green
             radiance[sample, 2] += wb * lamp.blue
             continue
-        else:
-            k = primitive - triangles
-            s = sphere_surface(
-                center[k, 0], center[k, 1], center[k, 2], radius[k], int(np.int64(sphere_material[k])),
-                np.float64(origin[ray, 0]), np.float64(origin[ray, 1]), np.float64(origin[ray, 2]),
-                dx, dy, dz,
-            )  # fmt: skip
+        s, b1, b2 = surface_met(
+            facets, surfaces.spheres, primitive,
+            np.float64(origin[ray, 0]), np.float64(origin[ray, 1]), np.float64(origin[ray, 2]), dx, dy, dz,
+        )  # fmt: skip
         material = materials[s.material]
         kr, kg, kb = float(material.diffuse_red), float(material.diffuse_green), float(material.diffuse_blue)
         sr, sg, sb = float(material.specular_red), float(material.specular_green), float(material.specular_blue)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from renderer.kernel import formula
 from renderer.prepared import MATERIAL_COLUMN, NORMAL_COLUMN, REACH_COLUMN, SMOOTH_COLUMN
-from renderer.sphere import hit_distance
+from renderer.sphere import SphereTree, hit_distance
 
 OFFSET_ULPS = 16.0 * 2.0**-23
 """How far a ray starts off its surface, in largest coordinates: twice what leaves no self-hit of 128,000."""
@@ -162,3 +162,27 @@ def sphere_surface(
     nx, ny, nz = nx * face, ny * face, nz * face
     offset = _farther(px, py, pz, 0.0) * OFFSET_ULPS + _farther(cx, cy, cz, radius) * SPHERE_OFFSET
     return Surface(px, py, pz, nx, ny, nz, nx, ny, nz, u, v, offset, 0.0, material, entering)
+
+
+@formula
+def surface_met(
+    facets: NDArray[np.float32],
+    spheres: SphereTree,
+    primitive: int,
+    ox: float, oy: float, oz: float, dx: float, dy: float, dz: float,
+) -> tuple[Surface, float, float]:  # fmt: skip
+    """The surface of a triangle, or else of a sphere, that a ray met; also the barycentric weights of the triangle's
+    second and third corner, 0 on a sphere.
+
+    Args:
+        facets, spheres: of the scene; triangles are counted first.
+        primitive: which of them.
+        ox, oy, oz, dx, dy, dz: origin and direction of the ray.
+    """
+    k = primitive - len(facets)
+    if k < 0:
+        b1, b2 = weights_at(facets, primitive, ox, oy, oz, dx, dy, dz)
+        return triangle_surface(facets, primitive, b1, b2, dx, dy, dz), b1, b2
+    center, material = spheres.center, int(np.int64(spheres.material[k]))
+    s = sphere_surface(center[k, 0], center[k, 1], center[k, 2], spheres.radius[k], material, ox, oy, oz, dx, dy, dz)
+    return s, 0.0, 0.0
