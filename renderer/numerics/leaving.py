@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.embree import EmbreeTriangles
-from renderer.kernel import kernel
+from renderer.kernel import formula, kernel
 from renderer.numerics.comparison import Comparison, time_ratio
 from renderer.prepared import FACET, NORMAL_COLUMN, REACH_COLUMN
-from renderer.surface import triangle_surface, weights_at
+from renderer.surface import Surface, triangle_surface, weights_at
 
 PLACES = ((0.0, 1.0), (1e3, 1.0), (1e5, 1.0), (10.0, 1e-3), (0.0, 1e-6), (0.0, 1e7))
 """Distance of the triangles from the origin, and their size."""
@@ -49,16 +49,22 @@ class _Hits(NamedTuple):
     distance: NDArray[np.float32]
 
 
+@formula
+def _surface(hits: _Hits, ray: int) -> Surface:
+    """The surface of one hit, from barycentric weights in float64."""
+    facets, origin, direction = hits.facets, hits.origin, hits.direction
+    t = hits.number[ray]
+    ox, oy, oz = np.float64(origin[ray, 0]), np.float64(origin[ray, 1]), np.float64(origin[ray, 2])
+    dx, dy, dz = np.float64(direction[ray, 0]), np.float64(direction[ray, 1]), np.float64(direction[ray, 2])
+    b1, b2 = weights_at(facets, t, ox, oy, oz, dx, dy, dz)
+    return triangle_surface(facets, t, b1, b2, dx, dy, dz)
+
+
 @kernel
 def _ours(hits: _Hits, leaving: NDArray[np.float32]) -> None:
-    """From barycentric weights in float64, 16 units in the last place of the largest coordinate off."""
-    facets, origin, direction = hits.facets, hits.origin, hits.direction
+    """16 units in the last place of the largest coordinate off."""
     for ray in range(len(leaving)):
-        t = hits.number[ray]
-        ox, oy, oz = np.float64(origin[ray, 0]), np.float64(origin[ray, 1]), np.float64(origin[ray, 2])
-        dx, dy, dz = np.float64(direction[ray, 0]), np.float64(direction[ray, 1]), np.float64(direction[ray, 2])
-        b1, b2 = weights_at(facets, t, ox, oy, oz, dx, dy, dz)
-        s = triangle_surface(facets, t, b1, b2, dx, dy, dz)
+        s = _surface(hits, ray)
         leaving[ray, 0] = s.px + s.offset * s.gx
         leaving[ray, 1] = s.py + s.offset * s.gy
         leaving[ray, 2] = s.pz + s.offset * s.gz
@@ -67,18 +73,11 @@ def _ours(hits: _Hits, leaving: NDArray[np.float32]) -> None:
 @kernel
 def _fixed(hits: _Hits, offset: float, leaving: NDArray[np.float32]) -> None:
     """The same place, a fixed length off."""
-    facets, origin, direction = hits.facets, hits.origin, hits.direction
     for ray in range(len(leaving)):
-        t = hits.number[ray]
-        ox, oy, oz = np.float64(origin[ray, 0]), np.float64(origin[ray, 1]), np.float64(origin[ray, 2])
-        dx, dy, dz = np.float64(direction[ray, 0]), np.float64(direction[ray, 1]), np.float64(direction[ray, 2])
-        b1, b2 = weights_at(facets, t, ox, oy, oz, dx, dy, dz)
-        s = triangle_surface(facets, t, b1, b2, dx, dy, dz)
-        leaving[ray, 0], leaving[ray, 1], leaving[ray, 2] = (
-            s.px + offset * s.gx,
-            s.py + offset * s.gy,
-            s.pz + offset * s.gz,
-        )
+        s = _surface(hits, ray)
+        leaving[ray, 0] = s.px + offset * s.gx
+        leaving[ray, 1] = s.py + offset * s.gy
+        leaving[ray, 2] = s.pz + offset * s.gz
 
 
 @kernel

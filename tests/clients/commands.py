@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 import argparse
+import os
+import pty
 import re
+import select
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
+from typing import IO
 
 import pytest
 
@@ -21,6 +27,32 @@ PATIENCE_S = 120
 def start(*words: str, **options: object) -> subprocess.Popen[bytes]:
     """The command as a process of its own."""
     return subprocess.Popen([sys.executable, "-W", "error", "-m", "clients.command_line", *words], **options)  # type: ignore[call-overload, no-any-return]
+
+
+def interrupted(when: bytes, *words: str, stdout: IO[bytes] | None = None) -> bytes:
+    """Run a command with a terminal as its standard error, and press Ctrl-C once that shows `when`, a pattern.
+
+    Returns:
+        What the terminal showed in all.
+    """
+    screen, terminal = pty.openpty()
+    process = start(*words, stdout=stdout, stderr=terminal)
+    os.close(terminal)
+    seen = b""
+    deadline = time.monotonic() + PATIENCE_S
+    while not re.search(when, seen):
+        assert select.select([screen], [], [], deadline - time.monotonic())[0], seen
+        seen += os.read(screen, 4096)
+    process.send_signal(signal.SIGINT)
+    while True:
+        try:
+            seen += os.read(screen, 4096)
+        except OSError:  # the other end of the terminal is closed
+            break
+    assert process.wait(PATIENCE_S) == 130
+    os.close(screen)
+    assert b"Traceback" not in seen
+    return seen
 
 
 def failing(capsys: pytest.CaptureFixture[str], *words: str, status: int = 2) -> str:

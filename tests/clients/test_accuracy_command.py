@@ -4,13 +4,8 @@ from __future__ import annotations
 
 import csv
 import json
-import os
-import pty
 import re
-import select
-import signal
 import sys
-import time
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -25,7 +20,7 @@ from clients.command_line.errors import UsageError
 from renderer.accuracy.record import read_report
 from renderer.acuity import MODELS
 from renderer.codec import decode_texture
-from tests.clients.commands import PATIENCE_S, failing, start
+from tests.clients.commands import failing, interrupted
 from tests.renderer.accuracy.examples import FAR, NEAR, REPORT
 
 pytestmark = pytest.mark.usefixtures("plain_environment")
@@ -139,26 +134,10 @@ def test_another_request_starts_over_and_says_so(capsys: pytest.CaptureFixture[s
 
 def test_ctrl_c_loses_the_frame_in_work_at_most(tmp_path: Path) -> None:
     """Standard error is a terminal here: the fourth setting is done when the progress says so."""
-    screen, terminal = pty.openpty()
     words = ("spheres", "--quick", "--size", "160x90", "--reference-samples", "4", "--repeats", "900", "-o", "found")
-    process = start("accuracy", *words, stderr=terminal)
-    os.close(terminal)
-    seen = b""
-    deadline = time.monotonic() + PATIENCE_S
-    while not re.search(rb"timing settings in turn[^\r]*\b[4-9]/", seen):
-        assert select.select([screen], [], [], deadline - time.monotonic())[0], seen
-        seen += os.read(screen, 4096)
-    process.send_signal(signal.SIGINT)
-    while True:
-        try:
-            seen += os.read(screen, 4096)
-        except OSError:  # the other end of the terminal is closed
-            break
-    assert process.wait(PATIENCE_S) == 130
-    os.close(screen)
+    seen = interrupted(rb"timing settings in turn[^\r]*\b[4-9]/", "accuracy", *words)
     stopped = re.search(rb"stopped with (\d+) of \1 settings compared and (\d+) of \d+ timed; the same command", seen)
     assert stopped is not None, seen
-    assert b"Traceback" not in seen
     records = log_of(tmp_path / "found")
     assert len([record for record in records if "times" in record]) == int(stopped[2]) >= 4
     assert len([record for record in records if "measured" in record]) == int(stopped[1])

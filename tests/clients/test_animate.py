@@ -3,13 +3,8 @@
 from __future__ import annotations
 
 import json
-import os
-import pty
 import re
-import select
-import signal
 import sys
-import time
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +15,7 @@ from clients.command_line import main
 from clients.command_line.errors import UsageError
 from clients.command_line.frame_folder import LOG, FrameFolder
 from renderer.codec import decode_texture
-from tests.clients.commands import PATIENCE_S, failing, start
+from tests.clients.commands import failing, interrupted
 
 pytestmark = pytest.mark.usefixtures("plain_environment")
 
@@ -157,25 +152,9 @@ def test_an_interrupted_clip_goes_on(capsys: pytest.CaptureFixture[str], tmp_pat
 def test_ctrl_c_leaves_a_clip_that_goes_on(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     """Standard error is a terminal here: the second frame is done when the progress says so."""
     words = ("spheres", *SCREEN, "--gaze-trace", "simulated", "--seconds", "60", "--orbit", "90", "-o", "clip")
-    screen, terminal = pty.openpty()
-    process = start("animate", *words, stderr=terminal)
-    os.close(terminal)
-    seen = b""
-    deadline = time.monotonic() + PATIENCE_S
-    while not re.search(rb"\b[2-9]/1500", seen):
-        assert select.select([screen], [], [], deadline - time.monotonic())[0], seen
-        seen += os.read(screen, 4096)
-    process.send_signal(signal.SIGINT)
-    while True:
-        try:
-            seen += os.read(screen, 4096)
-        except OSError:  # the other end of the terminal is closed
-            break
-    assert process.wait(PATIENCE_S) == 130
-    os.close(screen)
+    seen = interrupted(rb"\b[2-9]/1500", "animate", *words)
     stopped = re.search(rb"stopped with (\d+) of 1500 frames; the same command goes on", seen)
     assert stopped is not None, seen
-    assert b"Traceback" not in seen
     assert 2 <= int(stopped[1]) < 1500
     assert len(pictures(tmp_path / "clip")) == int(stopped[1])
     lines = (tmp_path / "clip" / LOG).read_text().splitlines()
