@@ -51,7 +51,7 @@ INVOKE_FILTER, COHERENT = 1 << 1, 1 << 16
 
 EVERY_FEATURE = 0xFFFFFFFF
 
-ORIGIN, NEAR, DIRECTION, TIME, FAR, MASK, FLAGS = 0, 3, 4, 7, 8, 9, 11
+ORIGIN, DIRECTION, FAR, MASK = 0, 4, 8, 9
 HIT = 12
 WEIGHT_1, WEIGHT_2, PRIMITIVE, GEOMETRY = 3, 4, 5, 6
 """Rows of a packet, each as wide as the packet; those of this line count from HIT."""
@@ -364,7 +364,9 @@ def _aligned(words: int) -> NDArray[np.float32]:
 def _packet(width: int) -> Packet:
     """An empty packet of `width` rays."""
     rows, valid, distances = _aligned(PACKET_ROWS * width), _aligned(width), _aligned(CONTEXT_WORDS)
-    return Packet(width, rows, rows.view(np.int32), valid.view(np.int32), distances, distances.view(np.int32))
+    words = rows.view(np.int32)
+    words[MASK * width : (MASK + 1) * width] = -1
+    return Packet(width, rows, words, valid.view(np.int32), distances, distances.view(np.int32))
 
 
 def _keeper(width: int) -> Callable[[Any], None]:
@@ -401,28 +403,62 @@ def _keeper(width: int) -> Callable[[Any], None]:
 
 @formula
 def _load_ray(
-    packet: Packet,
-    lane: int,
-    origin: NDArray[np.float32],
-    direction: NDArray[np.float32],
-    ray: int,
-    reach: np.float32,
+    packet: Packet, lane: int, origin: NDArray[np.float32], direction: NDArray[np.float32], ray: int, reach: np.float32
 ) -> bool:
     """Put one ray into a lane of a packet; True if it is parallel to a coordinate plane."""
-    width, rows, words = packet.width, packet.rows, packet.words
-    largest, smallest = np.float32(0.0), np.float32(np.inf)
+    width, rows = packet.width, packet.rows
     for axis in range(3):
         rows[(ORIGIN + axis) * width + lane] = origin[ray, axis]
         rows[(DIRECTION + axis) * width + lane] = direction[ray, axis]
-        largest, smallest = max(largest, abs(direction[ray, axis])), min(smallest, abs(direction[ray, axis]))
-    rows[NEAR * width + lane] = 0.0
-    rows[TIME * width + lane] = 0.0
     rows[FAR * width + lane] = reach
-    words[MASK * width + lane] = -1
-    words[FLAGS * width + lane] = 0
-    words[(HIT + PRIMITIVE) * width + lane] = -1
-    words[(HIT + GEOMETRY) * width + lane] = -1
-    return bool(smallest < PARALLEL * largest)
+    return _is_parallel(direction[ray, 0], direction[ray, 1], direction[ray, 2])
+
+
+@formula
+def _is_parallel(x: np.float32, y: np.float32, z: np.float32) -> bool:
+    x, y, z = abs(x), abs(y), abs(z)
+    return bool(min(x, min(y, z)) < PARALLEL * max(x, max(y, z)))
+
+
+@formula
+def _load_lanes(
+    width: int, rows: NDArray[np.float32], origin: NDArray[np.float32], direction: NDArray[np.float32], first: int
+) -> bool:
+    """Put rays into the lanes of a packet whose `width` is known to the compiler, which takes them together.
+
+    Returns:
+        Whether one of them is parallel to a coordinate plane.
+    """
+    parallel = 0
+    for lane in range(width):
+        ray = np.uint64(first + lane)
+        x, y, z = direction[ray, 0], direction[ray, 1], direction[ray, 2]
+        rows[ORIGIN * width + lane] = origin[ray, 0]
+        rows[(ORIGIN + 1) * width + lane] = origin[ray, 1]
+        rows[(ORIGIN + 2) * width + lane] = origin[ray, 2]
+        rows[DIRECTION * width + lane] = x
+        rows[(DIRECTION + 1) * width + lane] = y
+        rows[(DIRECTION + 2) * width + lane] = z
+        parallel |= 1 if _is_parallel(x, y, z) else 0
+    return parallel != 0
+
+
+@formula
+def _load_packet(
+    packet: Packet, origin: NDArray[np.float32], direction: NDArray[np.float32], first: int, count: int
+) -> bool:
+    """Put `count` rays into a packet, but for their reach; True if one is parallel to a coordinate plane."""
+    rows, valid = packet.rows, packet.valid
+    for lane in range(packet.width):
+        valid[lane] = -1 if lane < count else 0
+    if count == 16 and packet.width == 16:
+        return _load_lanes(16, rows, origin, direction, first)
+    if count == 8 and packet.width == 8:
+        return _load_lanes(8, rows, origin, direction, first)
+    parallel = False
+    for lane in range(count):
+        parallel |= _load_ray(packet, lane, origin, direction, first + lane, np.float32(0.0))
+    return parallel
 
 
 @formula
@@ -465,17 +501,67 @@ def _trace_nearest(
     width, distances, numbers = packet.width, packet.distances, packet.numbers
     for first in range(0, len(primitive), width):
         count = min(width, len(primitive) - first)
+        parallel = _load_packet(packet, origin, direction, first, count)
+        _forget(packet)
+        _search(intersect, scene, singly, together, coherent and not parallel, packet, origin, direction, first, False)
+        missed = 0
         for lane in range(count):
-            distances[DISTANCES + lane], numbers[NUMBERS + lane] = np.inf, -1
-        for turned in range(2 if again else 1):
-            _search(intersect, scene, singly, together, coherent, packet, origin, direction, first, count, turned == 1)
+            missed |= 1 if numbers[NUMBERS + lane] < 0 else 0
+        if again and missed != 0:
+            _search_again(intersect, scene, singly, together, coherent, packet, origin, direction, first, count)
         for lane in range(count):
             primitive[first + lane] = numbers[NUMBERS + lane]
             distance[first + lane] = distances[DISTANCES + lane]
 
 
+@formula
+def _forget(packet: Packet) -> None:
+    """Leave the rays of a packet with nothing met."""
+    width, rows, words = packet.width, packet.rows, packet.words
+    distances, numbers = packet.distances, packet.numbers
+    for lane in range(width):
+        rows[FAR * width + lane] = np.inf
+        words[(HIT + GEOMETRY) * width + lane] = -1
+    for lane in range(LANES):
+        distances[DISTANCES + lane], distances[MARGINS + lane] = np.inf, np.inf
+        numbers[NUMBERS + lane] = -1
+
+
 @kernel
 def _search(
+    intersect: int,
+    scene: int,
+    singly: NDArray[np.int64],
+    together: NDArray[np.int64],
+    packed: bool,
+    packet: Packet,
+    origin: NDArray[np.float32],
+    direction: NDArray[np.float32],
+    first: int,
+    turned: bool,
+) -> None:
+    """Search along the valid rays of a packet, which are loaded; near an edge, packed ones once more, singly."""
+    width, valid, distances, numbers = packet.width, packet.valid, packet.distances, packet.numbers
+    query = together if packed else singly
+    call(intersect, valid.ctypes.data, scene, packet.rows.ctypes.data, query.ctypes.data)
+    doubtful = 0
+    for lane in range(LANES):
+        doubtful |= 1 if distances[MARGINS + lane] < NEAR_EDGE else 0
+    if not packed or doubtful == 0:
+        return
+    for lane in range(width):
+        near_edge = valid[lane] != 0 and distances[MARGINS + lane] < NEAR_EDGE
+        valid[lane] = -1 if near_edge else 0
+        if near_edge:
+            _load_ray(packet, lane, origin, direction, first + lane, np.float32(np.inf))
+            if turned:
+                _turn_aside(packet, lane)
+            distances[DISTANCES + lane], numbers[NUMBERS + lane] = np.inf, -1
+    call(intersect, valid.ctypes.data, scene, packet.rows.ctypes.data, singly.ctypes.data)
+
+
+@kernel
+def _search_again(
     intersect: int,
     scene: int,
     singly: NDArray[np.int64],
@@ -486,36 +572,16 @@ def _search(
     direction: NDArray[np.float32],
     first: int,
     count: int,
-    turned: bool,
 ) -> None:
-    """Search along the rays of a packet that have met nothing yet, as they are or `turned` aside."""
-    width, valid, distances, numbers = packet.width, packet.valid, packet.distances, packet.numbers
-    parallel = waiting = False
-    for lane in range(width):
-        valid[lane] = -1 if lane < count and numbers[NUMBERS + lane] < 0 else 0
-        if valid[lane] != 0:
-            waiting = True
+    """Search along the rays of a packet that have met nothing, turned aside."""
+    parallel = False
+    for lane in range(packet.width):
+        packet.valid[lane] = -1 if lane < count and packet.numbers[NUMBERS + lane] < 0 else 0
+        packet.distances[MARGINS + lane] = np.inf
+        if packet.valid[lane] != 0:
             parallel |= _load_ray(packet, lane, origin, direction, first + lane, np.float32(np.inf))
-            if turned:
-                _turn_aside(packet, lane)
-            distances[MARGINS + lane] = np.inf
-    if not waiting:
-        return
-    packed = coherent and not parallel
-    query = together if packed else singly
-    call(intersect, valid.ctypes.data, scene, packet.rows.ctypes.data, query.ctypes.data)
-    doubtful = False
-    for lane in range(count if packed else 0):
-        near_edge = valid[lane] != 0 and distances[MARGINS + lane] < NEAR_EDGE
-        valid[lane] = -1 if near_edge else 0
-        if near_edge:
-            doubtful = True
-            _load_ray(packet, lane, origin, direction, first + lane, np.float32(np.inf))
-            if turned:
-                _turn_aside(packet, lane)
-            distances[DISTANCES + lane], numbers[NUMBERS + lane] = np.inf, -1
-    if doubtful:
-        call(intersect, valid.ctypes.data, scene, packet.rows.ctypes.data, singly.ctypes.data)
+            _turn_aside(packet, lane)
+    _search(intersect, scene, singly, together, coherent and not parallel, packet, origin, direction, first, True)
 
 
 @kernel
@@ -534,12 +600,9 @@ def _trace_occluded(
     width, valid, rows = packet.width, packet.valid, packet.rows
     for first in range(0, len(blocked), width):
         count = min(width, len(blocked) - first)
-        query = together
-        for lane in range(width):
-            valid[lane] = -1 if lane < count else 0
+        query = singly if _load_packet(packet, origin, direction, first, count) else together
         for lane in range(count):
-            if _load_ray(packet, lane, origin, direction, first + lane, reach[first + lane]):
-                query = singly
+            rows[FAR * width + lane] = reach[first + lane]
         call(occluded, valid.ctypes.data, scene, rows.ctypes.data, query.ctypes.data)
         for lane in range(count):
             blocked[first + lane] = 1 if rows[FAR * width + lane] == -np.inf else 0
