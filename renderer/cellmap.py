@@ -100,8 +100,8 @@ def _aligned_map(eye: EyeGeometry, bucket: GazeBucket, pool: Workers) -> CellMap
 
     pool.run(tile, len(tops))
     first = np.concatenate(([0], np.cumsum(counts)))
-    x, y, side = (np.zeros(int(first[-1]), dtype=np.int32) for _ in range(3))
-    mask = np.zeros((eye.height_px, eye.width_px), dtype=np.int32)
+    x, y, side = (np.empty(int(first[-1]), dtype=np.int32) for _ in range(3))
+    mask = np.empty((eye.height_px, eye.width_px), dtype=np.int32)
 
     def number(strip: int) -> None:
         number_cells(tops[strip], int(first[strip]), corners[strip], sides[strip], x, y, side, mask)

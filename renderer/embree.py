@@ -169,8 +169,8 @@ class EmbreeTriangles:
             if again and len(missed):
                 primitive[missed], distance[missed] = self._nearest_singly(origin[missed], _turned(direction[missed]))
             return primitive, distance
-        primitive = np.zeros(len(origin), dtype=np.int32)
-        distance = np.zeros(len(origin), dtype=np.float32)
+        primitive = np.empty(len(origin), dtype=np.int32)
+        distance = np.empty(len(origin), dtype=np.float32)
         packet = _packet(self._packets.width)
         singly, together = (
             _query(INVOKE_FILTER | flag, packet.distances.ctypes.data, self._packets.keep_nearest)

@@ -38,8 +38,8 @@ def reconstruct(
     strips = -(-height // STRIP_ROWS)
     chunks = -(-cell_map.cells // STRIP_CELLS)
     if linear:
-        means = np.zeros((cell_map.cells, 3), dtype=np.float32)
-        radiance = np.zeros((height, width, 3), dtype=np.float32)
+        means = np.empty((cell_map.cells, 3), dtype=np.float32)
+        radiance = np.empty((height, width, 3), dtype=np.float32)
 
         def average(chunk: int) -> None:
             part = slice(chunk * STRIP_CELLS, (chunk + 1) * STRIP_CELLS)
@@ -52,8 +52,8 @@ def reconstruct(
         pool.run(average, chunks)
         pool.run(spread, strips)
         return radiance
-    codes = np.zeros(cell_map.cells, dtype=np.uint32)
-    picture = np.zeros((height, width, 3), dtype=np.uint8)
+    codes = np.empty(cell_map.cells, dtype=np.uint32)
+    picture = np.empty((height, width, 3), dtype=np.uint8)
 
     def expose(chunk: int) -> None:
         part = slice(chunk * STRIP_CELLS, (chunk + 1) * STRIP_CELLS)

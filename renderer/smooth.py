@@ -41,9 +41,9 @@ def reconstruct_smooth(
         (h, w, 3) uint8 sRGB, or float32 linear radiance.
     """
     height, width = cell_map.mask.shape
-    means = np.zeros((cell_map.cells, 3), dtype=np.float32)
-    radiance = np.zeros((height, width, 3) if linear else (0, 0, 3), dtype=np.float32)
-    picture = np.zeros((0, 0, 3) if linear else (height, width, 3), dtype=np.uint8)
+    means = np.empty((cell_map.cells, 3), dtype=np.float32)
+    radiance = np.empty((height, width, 3) if linear else (0, 0, 3), dtype=np.float32)
+    picture = np.empty((0, 0, 3) if linear else (height, width, 3), dtype=np.uint8)
     factor = np.float32(1.0 if linear else exposure)
 
     def average(chunk: int) -> None:

@@ -133,7 +133,7 @@ def slots_of(cell_map: CellMap, pool: Workers) -> NDArray[np.int64]:
     if cell_map.kind == "scanline":
         return np.arange(cell_map.cells)
     height, width = cell_map.mask.shape
-    slots = np.zeros(cell_map.cells, dtype=np.int64)
+    slots = np.empty(cell_map.cells, dtype=np.int64)
     sides, starts = aligned_levels(width, height)
     first = np.zeros(int(sides[-1]) + 1, dtype=np.int64)
     columns = np.zeros_like(first)
@@ -208,8 +208,8 @@ def missing_cells(store: SampleStore, slots: NDArray[np.int64], wanted: int, poo
         wanted: samples a cell.
         pool: threads; the result does not depend on their number.
     """
-    cells = np.zeros(len(slots), dtype=np.int32)
-    first = np.zeros(len(slots), dtype=np.int32)
+    cells = np.empty(len(slots), dtype=np.int32)
+    first = np.empty(len(slots), dtype=np.int32)
     number, settled = store.samples.number, store.spread.settled
     starts = range(0, len(slots), CHUNK_CELLS)
     counts = np.zeros((len(starts), 3), dtype=np.int64)
