@@ -3,11 +3,18 @@
 from __future__ import annotations
 
 import argparse
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
-from tests.hostile.requests import ask
-from tests.hostile.state import FLAGS, Before
-from tests.hostile.stream import attack
-from tests.service.process import service_process
+from tests.hostile.odd_names import ask_odd_names
+from tests.hostile.requests import Asked, ask
+from tests.hostile.state import FLAGS, Before, Watch
+from tests.hostile.stream import Attacked, attack
+from tests.service.process import ServiceProcess, service_process
+
+TELL_S = 30.0
 
 
 def main() -> None:
@@ -16,21 +23,63 @@ def main() -> None:
     parser.add_argument("--cases", type=int, default=10_000, help="requests (default %(default)s)")
     parser.add_argument("--messages", type=int, default=100_000, help="messages (default %(default)s)")
     parser.add_argument("--seed", type=int, default=1, help="another one makes up others (default %(default)s)")
+    parser.add_argument("--workers", type=int, default=2, help="processes that make up requests (default %(default)s)")
     arguments = parser.parse_args()
     with service_process(*FLAGS) as service:
         before = Before(service)
         if arguments.what == "http":
-            asked = ask(service.address, arguments.cases, arguments.seed)
-            print(f"{asked.statuses.total():,} requests, {len(asked.wrong)} answered wrongly")
-            for operation, count in sorted(asked.operations.items()):
-                print(f"{count:8,}  {operation}")
-            print("statuses", dict(sorted(asked.statuses.items())))
-            assert not asked.wrong, "\n\n".join(asked.wrong)
+            _http(service, arguments.cases, arguments.seed, arguments.workers)
         else:
-            attacked = attack(service.address, arguments.messages, arguments.seed)
-            print(f"{attacked.sent:,} messages; connections ended, by close code: {dict(attacked.closes)}")
-            assert not attacked.mistakes, attacked.mistakes[:20]
-        print(before.check())
+            _stream(service, arguments.messages, arguments.seed)
+        print("state   ", before.check())
+
+
+def _http(service: ServiceProcess, cases: int, seed: int, workers: int) -> None:
+    asked = Asked()
+    with (
+        _telling(lambda: f"{asked.total:,} requests, {len(asked.wrong)} answered wrongly"),
+        Watch(service, lambda: asked.total) as watch,
+    ):
+        ask(service.address, cases, seed, workers, asked)
+    for (operation, status), count in sorted(asked.replies.items()):
+        print(f"{count:8,}  {status} {operation}")
+    assert not asked.wrong, "\n\n".join(f"{wrong.operation}: {wrong.found}" for wrong in asked.wrong)
+    odd = ask_odd_names(service.address)
+    assert not odd, "\n".join(odd)
+    print("memory  ", watch.growth, "requests")
+    assert watch.growth.flat
+
+
+def _stream(service: ServiceProcess, messages: int, seed: int) -> None:
+    attacked = Attacked()
+    with (
+        _telling(lambda: f"{attacked.sent:,} messages, {len(attacked.mistakes)} mistakes"),
+        Watch(service, lambda: attacked.sent) as watch,
+    ):
+        attack(service.address, messages, seed, attacked)
+    print("connections ended, by close code:", dict(attacked.closes))
+    assert not attacked.mistakes, attacked.mistakes[:20]
+    print("memory  ", watch.growth, "messages")
+    assert watch.growth.flat
+
+
+@contextmanager
+def _telling(line: Callable[[], str]) -> Iterator[None]:
+    """Print how far it has come, now and then, and at the end of the block."""
+    over, began = threading.Event(), time.monotonic()
+
+    def tell() -> None:
+        while not over.wait(TELL_S):
+            print(f"{time.monotonic() - began:6.0f} s  {line()}", flush=True)
+
+    teller = threading.Thread(target=tell)
+    teller.start()
+    try:
+        yield
+    finally:
+        over.set()
+        teller.join()
+        print(f"{time.monotonic() - began:6.0f} s  {line()}", flush=True)
 
 
 if __name__ == "__main__":

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import threading
 import time
+from collections.abc import Callable
 
 import httpx
 
+from tests.load.growth import Growth, growth_of
 from tests.service.conftest import PATIENCE_S
 from tests.service.process import ServiceProcess
 from tests.service.streaming import configure, sessions, viewer
@@ -34,6 +37,46 @@ def use(service: ServiceProcess) -> None:
     for path in ("/v1/scenes", "/v1/cellmap", "/v1/scenes/spheres/frame", "/metrics", "/readyz"):
         asked = query if "map" in path or "frame" in path else {}
         assert httpx.get(service.address + path, params=asked, timeout=PATIENCE_S).status_code == 200
+
+
+WATCH_S = 0.25
+"""Between two looks at the memory."""
+
+WARM_UP_SHARE = 0.25
+"""Of what was sent, before memory is held to anything: pools begin their threads, caches fill."""
+
+
+class Watch:
+    """The memory of a service while something is sent to it; looked at by a thread, until the block ends.
+
+    Args:
+        service: attacked.
+        sent: how much was sent by now.
+    """
+
+    def __init__(self, service: ServiceProcess, sent: Callable[[], int]) -> None:
+        self._service, self._sent = service, sent
+        self._series: list[tuple[int, int]] = []
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._look)
+
+    def __enter__(self) -> Watch:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._over.set()
+        self._thread.join()
+
+    @property
+    def growth(self) -> Growth:
+        """Of the memory, for each of what was sent after the warm-up."""
+        settled = [each for each in self._series if each[0] >= WARM_UP_SHARE * self._series[-1][0]]
+        return growth_of([sent for sent, _ in settled], [held for _, held in settled])
+
+    def _look(self) -> None:
+        while not self._over.wait(WATCH_S):
+            self._series.append((self._sent(), self._service.resident_bytes))
 
 
 class Before:

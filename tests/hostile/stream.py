@@ -16,8 +16,8 @@ from service import protocol
 from tests.hostile.messages import mutated, mutated_frame
 from tests.service.conftest import PATIENCE_S
 
-CLIENTS = 8
-"""At once."""
+CLIENTS = 16
+"""At once, so that the service never waits for them."""
 
 FRAME_SHARE = 0.1
 """How many of the messages are damaged WebSocket frames in place of damaged messages in whole ones."""
@@ -46,9 +46,9 @@ class Attacked:
     mistakes: list[str] = field(default_factory=list)
 
 
-def attack(address: str, messages: int, number: int = 1) -> Attacked:
-    """Send so many mutated messages; another `number` makes up others."""
-    attacked = Attacked()
+def attack(address: str, messages: int, number: int = 1, attacked: Attacked | None = None) -> Attacked:
+    """Send so many mutated messages; another `number` makes up others. `attacked` is counted up meanwhile."""
+    attacked = attacked or Attacked()
 
     async def all_clients() -> None:
         share = -(-messages // CLIENTS)

@@ -1,4 +1,4 @@
-"""Whether a process grows with its work: a line through its memory over the frames it has rendered."""
+"""Whether a process grows with its work: a line through its memory over how much it has done."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ ERRORS = 2.0
 
 @dataclass(frozen=True, slots=True)
 class Growth:
-    """How memory goes with frames.
+    """How memory goes with work: frames rendered, messages or requests answered.
 
     Attributes:
-        slope: [bytes/frame].
-        error: its standard error [bytes/frame].
-        frames: how many it was seen over.
+        slope: bytes for each.
+        error: its standard error.
+        done: how many it was seen over.
     """
 
     slope: float
     error: float
-    frames: int
+    done: int
 
     @property
     def flat(self) -> bool:
@@ -36,34 +36,34 @@ class Growth:
 
     @property
     def most(self) -> float:
-        """The steepest growth that the series leaves possible [bytes/frame]."""
+        """The steepest growth that the series leaves possible, in bytes for each."""
         return self.slope + ERRORS * self.error
 
     def __str__(self) -> str:
         verdict = "flat" if self.flat else "GROWS"
         return (
-            f"{verdict}: {self.slope:+.0f} +- {self.error:.0f} bytes a frame over {self.frames:,} frames, "
-            f"so at most {self.most:.0f}"
+            f"{verdict}: {self.slope:+.1f} +- {self.error:.1f} bytes for each of {self.done:,}, "
+            f"so at most {self.most:.1f}"
         )
 
 
-def growth_of(frames: Sequence[int], memory_bytes: Sequence[float]) -> Growth:
+def growth_of(done: Sequence[int], memory_bytes: Sequence[float]) -> Growth:
     """The line of least squares through the means of `BLOCKS` parts of a series.
 
     Args:
-        frames: rendered so far, not decreasing.
+        done: so far, not decreasing.
         memory_bytes: held then, as many, at least `BLOCKS`.
 
     Raises:
-        ValueError: for fewer, or where no frame was rendered.
+        ValueError: for fewer, or where nothing was done.
     """
-    if len(frames) != len(memory_bytes) or len(frames) < BLOCKS or frames[0] == frames[-1]:
-        raise ValueError(f"expected {BLOCKS} samples or more, over some frames, found {len(frames)}")
-    across = np.array([part.mean() for part in np.array_split(np.asarray(frames, dtype=np.float64), BLOCKS)])
+    if len(done) != len(memory_bytes) or len(done) < BLOCKS or done[0] == done[-1]:
+        raise ValueError(f"expected {BLOCKS} samples or more, over some work, found {len(done)}")
+    across = np.array([part.mean() for part in np.array_split(np.asarray(done, dtype=np.float64), BLOCKS)])
     up = np.array([part.mean() for part in np.array_split(np.asarray(memory_bytes, dtype=np.float64), BLOCKS)])
     across -= across.mean()
     spread = float(across @ across)
     slope = float(across @ up) / spread
     left = up - up.mean() - slope * across
     error = float(np.sqrt(left @ left / (BLOCKS - 2) / spread))
-    return Growth(slope, error, int(frames[-1] - frames[0]))
+    return Growth(slope, error, int(done[-1] - done[0]))

@@ -82,7 +82,7 @@ class Soak:
         memory = sorted(each.memory_bytes >> 20 for each in settled)
         figures = (
             f"frames    {last.frames:,} in {last.seconds / 60:.1f} minutes over {self.connections} connection(s)\n"
-            f"memory    {self.growth}\n"
+            f"memory    {self.growth} (frames)\n"
             f"          {memory[0]} to {memory[-1]} MiB after the warm-up\n"
             f"files     {min(descriptors)} to {max(descriptors)}\n"
             f"threads   {min(threads)} to {max(threads)}\n"

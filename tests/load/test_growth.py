@@ -16,7 +16,7 @@ def test_a_straight_line_is_found(slope: float) -> None:
     growth = growth_of(FRAMES, [300 * MIB + slope * frame for frame in FRAMES])
     assert growth.slope == pytest.approx(slope, abs=1e-3)
     assert growth.error == pytest.approx(0.0, abs=1e-3)
-    assert growth.frames == FRAMES[-1]
+    assert growth.done == FRAMES[-1]
 
 
 @pytest.mark.parametrize("alike", [1, 40])
