@@ -57,7 +57,7 @@ def _stream(service: ServiceProcess, messages: int, seed: int) -> None:
         Watch(service, lambda: attacked.sent) as watch,
     ):
         attack(service.address, messages, seed, attacked)
-    print("connections ended, by close code:", dict(attacked.closes))
+    print("connections ended, by close code:", dict(attacked.closes), flush=True)
     assert not attacked.mistakes, attacked.mistakes[:20]
     print("memory  ", watch.growth, "messages")
     assert watch.growth.flat

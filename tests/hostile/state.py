@@ -15,10 +15,10 @@ from tests.service.streaming import configure, sessions, viewer
 
 FLAGS = (
     "--threads", "1", "--max-pixels", "4096", "--max-camera-rays", "20000", "--max-sessions", "16",
-    "--session-expiry-s", "1", "--map-cache-bytes", str(8 << 20), "--store-bytes", str(8 << 20),
+    "--session-expiry-s", "1", "--map-cache-bytes", str(1 << 20), "--store-bytes", str(1 << 20),
     "--scene-bytes", str(256 << 20),
 )  # fmt: skip
-"""A small service that forgets soon."""
+"""A small service that forgets soon, and whose caches are full soon."""
 
 MORE_DESCRIPTORS = 8
 MORE_THREADS = 16

@@ -72,6 +72,7 @@ async def _client(address: str, messages: int, chance: random.Random, attacked: 
             compression=None,
             proxy=None,
             ping_interval=None,
+            open_timeout=PATIENCE_S,
         ) as connection:
             left -= await asyncio.wait_for(_talk(connection, path, left, chance, attacked), PATIENCE_S)
 
