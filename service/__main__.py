@@ -10,6 +10,7 @@ import socket
 import sys
 import threading
 
+from renderer.allocator import keep_freed_memory
 from service.request_log import configure_logging
 from service.server import run
 from service.settings import Settings
@@ -19,6 +20,7 @@ log = logging.getLogger("service")
 
 def main(words: list[str]) -> None:
     """Serve on the socket of a descriptor, with the settings of the environment, until stopped."""
+    keep_freed_memory()  # before there are threads
     threading.Thread(target=_end_with_parent, name="gazetrace-lifeline", daemon=True).start()
     faulthandler.enable()
     settings = Settings.from_environment(os.environ)

@@ -1,4 +1,4 @@
-"""What a service must be like after an attack: nothing kept, nothing said by a mistake, and others are served."""
+"""What a service must be like after an attack: no crash, nothing kept, no mistake in its log, and others are served."""
 
 from __future__ import annotations
 
@@ -85,6 +85,7 @@ class Before:
     def __init__(self, service: ServiceProcess) -> None:
         use(service)
         self._service = service
+        self._process = service.pid
         self._descriptors = service.descriptors
         self._threads = service.threads
         self._resident_bytes = service.resident_bytes
@@ -93,6 +94,7 @@ class Before:
         """Raise AssertionError unless it is as it was; the figures, for people."""
         service = self._service
         use(service)
+        assert service.pid == self._process, "it crashed, and was started again"
         until = time.monotonic() + PATIENCE_S
         while (left := sessions(service.address)) or service.descriptors > self._descriptors + MORE_DESCRIPTORS:
             assert time.monotonic() < until, f"{service.descriptors} descriptors, sessions {left}"

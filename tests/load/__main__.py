@@ -53,6 +53,7 @@ def hold_viewers(viewers: int, sessions: int, seconds: float) -> None:
         f"{found.request_at(0.99):.0f} ms (99 %), of {len(found.request_ms)}"
     )
     print(f"memory    {found.memory_mib[0]:.0f} MiB after the warm-up, then {found.memory_growth_mib:+.1f} MiB")
+    print(f"          {found.growth} (frames)")
     print(f"files     {min(found.descriptors)} to {max(found.descriptors)}")
     print(f"threads   {min(found.threads)} to {max(found.threads)}")
     print(f"lost      {len(found.lost)} connections or requests {found.lost[:3] or ''}")

@@ -15,6 +15,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.typing import Subprotocol
 
 from service import protocol
+from tests.load.growth import Growth, growth_of
 from tests.service.conftest import PATIENCE_S
 from tests.service.process import ServiceProcess
 
@@ -31,6 +32,8 @@ REQUEST_S = 0.2
 SAMPLE_S = 0.5
 """Between two looks at what the service holds."""
 
+MIB = 1 << 20
+
 WARM_UP_SHARE = 0.25
 """Of the time, before anything is counted: caches fill, threads begin."""
 
@@ -46,6 +49,7 @@ class Load:
         frames: taken in by all viewers, by session.
         request_ms: of each small request.
         memory_mib, descriptors, threads: of the service, over time.
+        done: frames by then.
         lost: connections that ended, and requests that were not answered with a frame.
     """
 
@@ -55,6 +59,7 @@ class Load:
     memory_mib: list[float] = field(default_factory=list)
     descriptors: list[int] = field(default_factory=list)
     threads: list[int] = field(default_factory=list)
+    done: list[int] = field(default_factory=list)
     lost: list[str] = field(default_factory=list)
 
     @property
@@ -65,6 +70,11 @@ class Load:
     def request_at(self, share: float) -> float:
         """Time within which this share of the small requests was answered [ms]."""
         return sorted(self.request_ms)[min(int(share * len(self.request_ms)), len(self.request_ms) - 1)]
+
+    @property
+    def growth(self) -> Growth:
+        """Of the memory, for each frame taken in; of a run that lasts for minutes."""
+        return growth_of(self.done, [held * MIB for held in self.memory_mib])
 
     @property
     def memory_growth_mib(self) -> float:
@@ -170,7 +180,8 @@ async def _ask(service: ServiceProcess, found: Load, counting: asyncio.Event) ->
 async def _watch(service: ServiceProcess, found: Load, counting: asyncio.Event) -> None:
     while True:
         await counting.wait()
-        found.memory_mib.append(service.resident_bytes / (1 << 20))
+        found.memory_mib.append(service.resident_bytes / MIB)
         found.descriptors.append(service.descriptors)
         found.threads.append(service.threads)
+        found.done.append(found.frames.total())
         await asyncio.sleep(SAMPLE_S)
