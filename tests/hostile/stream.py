@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
 import random
 from collections import Counter
@@ -91,7 +92,8 @@ async def _talk(connection: ClientConnection, path: str, most: int, chance: rand
                 frame = mutated_frame(chance)
                 last = repr(frame)
                 connection.transport.write(frame)
-                connection.transport.write_eof()
+                with contextlib.suppress(OSError):  # the service has ended the connection already
+                    connection.transport.write_eof()
                 while True:
                     _note(await connection.recv(), last, attacked)
             message = mutated(chance)
