@@ -53,7 +53,9 @@ def _http(service: ServiceProcess, cases: int, seed: int, workers: int) -> None:
 def _stream(service: ServiceProcess, messages: int, seed: int) -> None:
     attacked = Attacked()
     with (
-        _telling(lambda: f"{attacked.sent:,} messages, {len(attacked.mistakes)} mistakes"),
+        _telling(
+            lambda: f"{attacked.sent:,} messages, {len(attacked.mistakes)} mistakes {attacked.mistakes[-1:] or ''}"
+        ),
         Watch(service, lambda: attacked.sent) as watch,
     ):
         attack(service.address, messages, seed, attacked)

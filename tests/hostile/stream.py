@@ -10,7 +10,7 @@ from collections import Counter
 from dataclasses import dataclass, field
 
 from websockets.asyncio.client import ClientConnection, connect
-from websockets.exceptions import ConnectionClosed
+from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.typing import Subprotocol
 
 from service import protocol
@@ -31,6 +31,12 @@ SESSIONS = 24
 MISTAKES = (1011, protocol.CloseCode.TRY_LATER)
 """Close codes with which a service admits a mistake of its own."""
 
+TOO_SLOW = "keepalive ping timeout"
+"""Why a connection ends with one of these codes where it was no mistake: this process had no processor for too long."""
+
+TOO_SLOW_STATUS = 408
+"""The same, before the connection is one of messages."""
+
 
 @dataclass
 class Attacked:
@@ -38,7 +44,7 @@ class Attacked:
 
     Attributes:
         sent: messages.
-        closes: connections that the service ended, by close code.
+        closes: connections that the service ended, by close code or, where there was none, status.
         mistakes: what the service said or did by a mistake of its own, and the message before it.
     """
 
@@ -66,7 +72,7 @@ async def _client(address: str, messages: int, chance: random.Random, attacked: 
         path = "/v1/stream"
         if chance.random() < GAZE_SHARE:
             path = f"/v1/gaze?session=s{chance.randrange(SESSIONS)}"
-        async with connect(
+        connecting = connect(
             address.replace("http", "ws", 1) + path,
             subprotocols=[Subprotocol(protocol.SUBPROTOCOL)],
             max_size=None,
@@ -74,8 +80,14 @@ async def _client(address: str, messages: int, chance: random.Random, attacked: 
             proxy=None,
             ping_interval=None,
             open_timeout=PATIENCE_S,
-        ) as connection:
-            left -= await asyncio.wait_for(_talk(connection, path, left, chance, attacked), PATIENCE_S)
+        )
+        try:
+            async with connecting as connection:
+                left -= await asyncio.wait_for(_talk(connection, path, left, chance, attacked), PATIENCE_S)
+        except InvalidStatus as refused:
+            attacked.closes[refused.response.status_code] += 1
+            if refused.response.status_code != TOO_SLOW_STATUS:
+                attacked.mistakes.append(str(refused))
 
 
 async def _talk(connection: ClientConnection, path: str, most: int, chance: random.Random, attacked: Attacked) -> int:
@@ -91,8 +103,8 @@ async def _talk(connection: ClientConnection, path: str, most: int, chance: rand
             if chance.random() < FRAME_SHARE:
                 frame = mutated_frame(chance)
                 last = repr(frame)
-                connection.transport.write(frame)
-                with contextlib.suppress(OSError):  # the service has ended the connection already
+                with contextlib.suppress(OSError, RuntimeError):  # the service has ended the connection already
+                    connection.transport.write(frame)
                     connection.transport.write_eof()
                 while True:
                     _note(await connection.recv(), last, attacked)
@@ -103,10 +115,10 @@ async def _talk(connection: ClientConnection, path: str, most: int, chance: rand
             while not _note(await connection.recv(), last, attacked):
                 pass
     except ConnectionClosed:
-        code = connection.protocol.close_rcvd.code if connection.protocol.close_rcvd else None
-        attacked.closes[code] += 1
-        if code in MISTAKES:
-            attacked.mistakes.append(f"closed with {code} after {last}")
+        close = connection.protocol.close_rcvd
+        attacked.closes[close.code if close else None] += 1
+        if close and close.code in MISTAKES and close.reason != TOO_SLOW:
+            attacked.mistakes.append(f"closed with {close.code} {close.reason} after {last}")
     return sent
 
 
