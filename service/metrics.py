@@ -26,7 +26,7 @@ class Now:
         connections: of clients, streams among them.
         sessions, viewers, gaze_sources: of streams.
         running_frames, waiting_frames: of requests: in work, and waiting for their turn.
-        held_bytes: kept between frames, by kind.
+        held_bytes: kept between frames or granted to them, by kind.
     """
 
     connections: int
@@ -71,7 +71,7 @@ class Metrics:
         self._viewers = self._gauge("viewers", "Viewers connected.")
         self._sources = self._gauge("gaze_sources", "Gaze sources connected.")
         self._queue = self._gauge("requested_frames", "Frames of requests, running or waiting for their turn.", "state")
-        self._held = self._gauge("held_bytes", "Memory of what is kept between frames.", "kind")
+        self._held = self._gauge("held_bytes", "Memory of what is kept, and granted to frames in work.", "kind")
         ProcessCollector(registry=self._registry)
 
     def frame(self, cost: FrameCost, stages_ms: Mapping[str, float]) -> None:

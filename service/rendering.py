@@ -23,9 +23,13 @@ from renderer.prepared import PreparedScene
 from renderer.quality import Quality
 from service.idle import Idle
 from service.metrics import Metrics
+from service.room import Room
 from service.settings import Settings
 
 NS_PER_MS = 1_000_000
+
+BYTES_A_PIXEL = 128
+"""Memory of a frame in work: 110 were measured, with a cell a pixel and adaptive samples."""
 
 LONGEST_REASON = 200
 """Characters of a compiler's message that are told; the log has all of it."""
@@ -110,6 +114,7 @@ class Studio:
 
     Attributes:
         idle: whoever has work for when nobody waits for a frame asks it.
+        room: memory for frames in work.
     """
 
     def __init__(self, settings: Settings, renderer: Renderer, library: SceneLibrary, metrics: Metrics) -> None:
@@ -117,6 +122,7 @@ class Studio:
         self.metrics = metrics
         self.library = library
         self.idle = Idle()
+        self.room = Room(settings.frame_bytes)
         self._renderer = renderer
         self._frames = itertools.count(1)
         self._not_ready: str | None = "the kernels are not compiled yet"
@@ -149,6 +155,7 @@ class Studio:
     def close(self) -> None:
         """Say no more about kernels: the renderer is about to end, perhaps while it still compiles them."""
         self._closed = True
+        self.room.close()
 
     def require_ready(self) -> None:
         """Return if frames can be rendered.
@@ -182,6 +189,12 @@ class Studio:
             raise OverLimit(
                 "display", f"{display.width_px} x {display.height_px} px is more than {limits.max_pixels:,} pixels"
             )
+        if display.pixels * BYTES_A_PIXEL > limits.frame_bytes:
+            raise OverLimit(
+                "display",
+                f"{display.width_px} x {display.height_px} px take {display.pixels * BYTES_A_PIXEL:,} bytes of memory, "
+                f"more than {limits.frame_bytes:,}",
+            )
         if quality.samples_per_cell > limits.max_samples_per_cell:
             raise OverLimit(
                 "quality.samples_per_cell", f"{quality.samples_per_cell} is more than {limits.max_samples_per_cell}"
@@ -197,15 +210,16 @@ class Studio:
 
     def cell_map(self, display: Display, quality: Quality, gaze: Gaze) -> tuple[CellMap, bool]:
         """The cells for a gaze, and whether they were known already."""
-        with self.idle.busy():
+        with self.idle.busy(), self.room.take(display.pixels * BYTES_A_PIXEL):
             return self._renderer.cell_map(display, quality, gaze)
 
     def held_bytes(self) -> dict[str, int]:
-        """What is kept between frames, by kind."""
+        """What is kept between frames, and what frames in work may take, by kind."""
         return {
             "maps": self._renderer.map_cache.nbytes,
             "samples": self._renderer.store_cache.nbytes,
             "scenes": self.library.nbytes,
+            "frames": self.room.lent,
         }
 
     def etag(self, order: Order) -> str:
@@ -269,8 +283,8 @@ class Studio:
             Abandoned: soon after `abandon` is set.
             OverLimit: for more camera rays than one request may ask for.
         """
-        started_ns = time.monotonic_ns()
-        with self.idle.busy():
+        with self.idle.busy(), self.room.take(request.display.pixels * BYTES_A_PIXEL, abandon):
+            started_ns = time.monotonic_ns()
             known_map, map_ms = self._check_cells(request)
             frame = self._renderer.render(prepared, request, abandon)
         cost = replace(frame.cost, map_cached=frame.cost.map_cached and known_map)

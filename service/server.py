@@ -16,9 +16,6 @@ from service.settings import Settings
 GOODBYE_S = 5
 """How long requests in work may take to end when the service is told to stop [s]."""
 
-PING_S = 20.0
-"""How often a stream's client is asked whether it is still there, and how long it may take to answer [s]."""
-
 
 def run(settings: Settings, listener: socket.socket, announce: Callable[[str], None], crashes: int = 0) -> None:
     """Serve until stopped (Ctrl-C or SIGTERM).
@@ -60,8 +57,8 @@ def server_config(app: FastAPI, settings: Settings) -> uvicorn.Config:
         h11_max_incomplete_event_size=settings.max_header_bytes,
         ws="websockets-sansio",
         ws_max_size=settings.max_message_bytes,
-        ws_ping_interval=PING_S,
-        ws_ping_timeout=PING_S,
+        ws_ping_interval=settings.ping_s,
+        ws_ping_timeout=settings.ping_s,
         ws_per_message_deflate=False,
         lifespan="on",
         proxy_headers=False,

@@ -66,7 +66,9 @@ class Settings:
         max_viewers: viewers, and gaze sources, of one session.
         max_message_bytes: longest message of a stream that is read.
         max_messages_per_s: most messages a second of a client of a stream, over any second.
+        ping_s: how often a stream's client is asked whether it is there, and how long it may take to answer [s].
         session_expiry_s: how long a session is kept for those who left it [s].
+        frame_bytes: memory for frames in work, 128 bytes a pixel; beyond, they wait for each other.
         map_cache_bytes: memory for cell maps.
         store_bytes: memory for samples of earlier frames.
         scene_bytes: memory for loaded scenes.
@@ -107,7 +109,9 @@ class Settings:
     max_viewers: int = 16
     max_message_bytes: int = MAX_TEXT_BYTES
     max_messages_per_s: int = 2500
+    ping_s: int = 20
     session_expiry_s: int = 60
+    frame_bytes: int = 4 << 30
     map_cache_bytes: int = 256 << 20
     store_bytes: int = 512 << 20
     scene_bytes: int = 1 << 30
@@ -139,11 +143,12 @@ class Settings:
         require_integer("max_viewers", self.max_viewers, 1, MOST_SESSIONS)
         require_integer("max_message_bytes", self.max_message_bytes, LEAST_MESSAGE_BYTES, MAX_TEXT_BYTES)
         require_integer("max_messages_per_s", self.max_messages_per_s, 1, MOST_MESSAGES_PER_S)
+        require_integer("ping_s", self.ping_s, 1, LONGEST_CLIENT_TIMEOUT_S)
         require_integer("session_expiry_s", self.session_expiry_s, 0, LONGEST_EXPIRY_S)
         require_integer("max_load_s", self.max_load_s, 1, LONGEST_LOAD_S)
         for name in ("map_cache_bytes", "store_bytes", "scene_bytes"):
             require_integer(name, getattr(self, name), 0, MOST_BYTES)
-        for name in ("max_scene_file_bytes", "max_triangles", "max_texture_pixels", "max_load_bytes"):
+        for name in ("frame_bytes", "max_scene_file_bytes", "max_triangles", "max_texture_pixels", "max_load_bytes"):
             require_integer(name, getattr(self, name), 1, MOST_BYTES)
         if self.scenes is not None and not os.path.isdir(self.scenes):
             raise SettingsError("scenes", "a folder", str(self.scenes))

@@ -65,8 +65,14 @@ class Recorder:
         self._thread.start()
 
     def keep(self, chunk: Chunk) -> None:
-        """Have a chunk written; returns at once."""
-        self._queue.put(chunk)
+        """Have a chunk written, unless the recording has ended by an error; returns at once."""
+        if self.error is None:
+            self._queue.put(chunk)
+
+    @property
+    def waiting(self) -> int:
+        """Chunks that are not written yet."""
+        return self._queue.qsize()
 
     def close(self) -> None:
         """Write what waits, and close the file."""

@@ -10,6 +10,7 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import IO
 
 from tests.service.conftest import PATIENCE_S
 
@@ -21,17 +22,17 @@ class ServiceProcess:
 
     Attributes:
         address: its URL.
-        lines: of standard output and standard error together.
+        lines: of standard output and, unless it goes elsewhere, of standard error.
     """
 
-    def __init__(self, *flags: str, **variables: str) -> None:
+    def __init__(self, *flags: str, stderr: int | IO[bytes] = subprocess.STDOUT, **variables: str) -> None:
         self.lines: list[str] = []
         self.address = ""
         self._ready = threading.Event()
         self._process = subprocess.Popen(
             [sys.executable, "-m", "clients.command_line", "serve", "--port", "0", *flags],
             stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
+            stderr=stderr,
             text=True,
             env={**os.environ, **variables},
         )
@@ -88,6 +89,12 @@ class ServiceProcess:
         return pages * os.sysconf("SC_PAGE_SIZE")
 
     @property
+    def peak_bytes(self) -> int:
+        """Most memory of it that was ever in use."""
+        lines = dict(line.split(":", 1) for line in self._proc("status").read_text().splitlines())
+        return int(lines["VmHWM"].split()[0]) << 10
+
+    @property
     def descriptors(self) -> int:
         """Open files and sockets."""
         return len(list(self._proc("fd").iterdir()))
@@ -111,9 +118,11 @@ class ServiceProcess:
 
 
 @contextmanager
-def service_process(*flags: str, **variables: str) -> Iterator[ServiceProcess]:
+def service_process(
+    *flags: str, stderr: int | IO[bytes] = subprocess.STDOUT, **variables: str
+) -> Iterator[ServiceProcess]:
     """`gazetrace serve` with these flags and variables, once it renders; ended with the block."""
-    service = ServiceProcess(*flags, **variables)
+    service = ServiceProcess(*flags, stderr=stderr, **variables)
     try:
         service.wait_ready()
         yield service

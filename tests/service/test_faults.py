@@ -19,6 +19,7 @@ from service.protocol import CloseCode
 from tests.service.conftest import PATIENCE_S
 from tests.service.process import ServiceProcess, service_process
 from tests.service.streaming import configure, viewer
+from tests.small_disk import small_disk
 
 DRAIN_S = 5.0
 """How long a service may take to end."""
@@ -164,3 +165,17 @@ def test_a_crash_while_a_scene_is_read_is_an_error_of_that_scene(tmp_path: Path)
         os.utime(scene)
         assert httpx.get(path, params=SMALL, timeout=PATIENCE_S).status_code == 200
         assert "gazetrace_crashes 0.0" in httpx.get(f"{service.address}/metrics").text
+
+
+def test_a_full_disk_under_the_log_costs_lines_of_the_log(tmp_path: Path) -> None:
+    with (
+        small_disk(tmp_path / "disk") as disk,
+        (disk / "log").open("wb") as log,
+        service_process("--threads", "1", "--log-json", stderr=log) as service,
+        httpx.Client(base_url=service.address, timeout=PATIENCE_S) as client,
+    ):
+        while os.statvfs(disk).f_bfree:
+            assert client.get("/healthz").status_code == 200
+        for _ in range(50):
+            assert client.get("/healthz").status_code == 200
+        assert frame(service, SMALL).status_code == 200
