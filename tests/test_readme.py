@@ -99,6 +99,7 @@ def test_each_command_works(words: list[str], tmp_path: Path, monkeypatch: pytes
     (tmp_path / "eye.csv").write_text("t_ms,x_px,y_px\n0,960,540\n40,1200,300\n")
     shrinks = ("render", "bench", "animate", "watch", "figures")
     small = ["--size", "64x36", "--samples", "1"] if words[0] in shrinks else []
+    small += ["--size", "64x36", "--nodes", "1,2"] if words[0] == "simulate" else []
     small += ["--repeats", "1"] if words[0] in ("accuracy", "figures") else []
     small += ["--size", "32x18", "--reference-samples", "2", "--no-report"] if words[0] == "accuracy" else []
     small += ["--seconds", "0.2"] if "--temporal" in words else []
@@ -111,7 +112,18 @@ def test_each_command_works(words: list[str], tmp_path: Path, monkeypatch: pytes
 
 def test_the_table_of_commands_is_complete() -> None:
     named = {words.split()[1].strip("`") for words, _ in table("Commands")}
-    assert named == {"serve", "render", "scenes", "bench", "animate", "watch", "bridge", "figures", "accuracy"}
+    assert named == {
+        "serve",
+        "render",
+        "scenes",
+        "bench",
+        "animate",
+        "watch",
+        "bridge",
+        "figures",
+        "accuracy",
+        "simulate",
+    }
 
 
 def test_every_setting_is_in_the_table_with_its_default() -> None:

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from importlib import metadata
 from typing import Any, NoReturn
 
-from clients.command_line import accuracy, animate, bench, bridge, figures, render, scenes, serve, watch
+from clients.command_line import accuracy, animate, bench, bridge, figures, render, scenes, serve, simulate, watch
 from clients.command_line.errors import BROKEN_PIPE, INTERRUPTED, UsageError, exit_code, one_line
 
 DESCRIPTION = """\
@@ -60,7 +60,7 @@ def build_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action=ShowVersion, nargs=0, help="print the version and exit")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    for command in (serve, render, scenes, accuracy, bench, animate, watch, bridge, figures):
+    for command in (serve, render, scenes, accuracy, bench, animate, watch, bridge, figures, simulate):
         command.add(commands)
     for command_parser in commands.choices.values():
         command_parser.allow_abbrev = False

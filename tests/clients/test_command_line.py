@@ -19,7 +19,7 @@ from tests.clients.commands import PATIENCE_S, SMALL, failing, help_of, interrup
 
 pytestmark = pytest.mark.usefixtures("plain_environment")
 
-COMMANDS = ("serve", "render", "scenes", "accuracy", "figures", "bench", "animate", "watch", "bridge")
+COMMANDS = ("serve", "render", "scenes", "accuracy", "figures", "bench", "animate", "watch", "bridge", "simulate")
 RENDER = ("render", "spheres", "-o", "a.png")
 
 

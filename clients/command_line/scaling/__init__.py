@@ -1,0 +1,1 @@
+"""How far frames scale over the nodes of a cluster: simulated, from rates that were measured."""
