@@ -7,6 +7,7 @@ import logging
 import time
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
+from typing import TYPE_CHECKING
 
 from fastapi import FastAPI
 from starlette.middleware import Middleware
@@ -31,6 +32,9 @@ from service.settings import Settings
 from service.stage import Stage
 from service.survey import Survey, Surveyor
 
+if TYPE_CHECKING:
+    from service.cluster.cluster import Cluster
+
 LOOKUP_THREADS = 4
 QUEUED_LOOKUPS = 64
 """Lookups are quick (a cell map, a description), so many may wait."""
@@ -50,7 +54,7 @@ def create_app(
 
     Args:
         settings: limits and access.
-        renderer: renders for this application and others; None for one of its own.
+        renderer: renders for this application and others, on this machine; None for one of its own.
         announce: receives a line when the kernels begin to compile and one when frames can be rendered.
         clock: of the sessions, monotonic [ns].
         survey: what is measured of a scene in idle time; None for the usual.
@@ -59,10 +63,12 @@ def create_app(
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
-        own = renderer or Renderer(settings.threads, settings.map_cache_bytes, settings.store_bytes)
+        cluster = None if settings.cluster is None else _join(settings.cluster, settings.threads, announce)
+        own = renderer or Renderer(settings.threads, settings.map_cache_bytes, settings.store_bytes, cluster)
         loader = Loader(settings)
         library = SceneLibrary(settings.scenes, settings.scene_bytes, loader.read)
-        studio = Studio(settings, own, library, Metrics(crashes))
+        obstacle = (lambda: None) if cluster is None else (lambda: cluster.obstacle)
+        studio = Studio(settings, own, library, Metrics(crashes), obstacle)
         desk = Desk(
             studio,
             Catalogue(library),
@@ -76,6 +82,8 @@ def create_app(
         desk.sessions.open()
         yield
         desk.studio.close()
+        if cluster is not None:
+            await asyncio.to_thread(cluster.close)
         desk.sessions.close()
         loader.close()
         await asyncio.to_thread(desk.surveyor.close)
@@ -98,6 +106,12 @@ def create_app(
         app.include_router(part.router)
     describe_api(app, settings)
     return app
+
+
+def _join(address: str, threads: int | None, announce: Callable[[str], None]) -> Cluster:
+    from service.cluster.cluster import Cluster
+
+    return Cluster(address, threads, announce)
 
 
 def _gates(settings: Settings) -> list[Middleware]:

@@ -111,13 +111,21 @@ class Studio:
         renderer: traces; belongs to the caller.
         library: scenes; belongs to the caller.
         metrics: counts frames.
+        obstacle: why nothing can be traced now, None if it can; asked again and again.
 
     Attributes:
         idle: whoever has work for when nobody waits for a frame asks it.
         room: memory for frames in work.
     """
 
-    def __init__(self, settings: Settings, renderer: Renderer, library: SceneLibrary, metrics: Metrics) -> None:
+    def __init__(
+        self,
+        settings: Settings,
+        renderer: Renderer,
+        library: SceneLibrary,
+        metrics: Metrics,
+        obstacle: Callable[[], str | None] = lambda: None,
+    ) -> None:
         self.settings = settings
         self.metrics = metrics
         self.library = library
@@ -126,6 +134,7 @@ class Studio:
         self._renderer = renderer
         self._frames = itertools.count(1)
         self._not_ready: str | None = "the kernels are not compiled yet"
+        self._obstacle = obstacle
         self._closed = False
         self._libraries = library_versions()
 
@@ -163,8 +172,9 @@ class Studio:
         Raises:
             NotReady: saying why not.
         """
-        if self._not_ready is not None:
-            raise NotReady(self._not_ready)
+        why = self._not_ready or self._obstacle()
+        if why is not None:
+            raise NotReady(why)
 
     def check_order(self, order: Order) -> None:
         """Return if one request may ask for this frame, and its format can hold it.

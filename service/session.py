@@ -293,6 +293,10 @@ class Session:
             rendered, encoded = await self._rendered(configuration, progress, step)
         except Abandoned:
             return
+        except NotReady as error:  # it goes on where it stopped, once there is someone to trace again
+            self._refuse(error)
+            await self._woken()
+            return
         except Exception as error:
             progress.over = True
             self._refuse(error)

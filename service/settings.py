@@ -7,6 +7,7 @@ import os
 import ssl
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -20,6 +21,9 @@ VARIABLE_PREFIX = "GAZETRACE_"
 
 SHORTEST_TOKEN = 8
 """Fewest characters of a token; a shorter one is soon guessed."""
+
+CLUSTERS = ("auto", "local")
+"""In place of the address of a cluster."""
 
 MOST_THREADS = 1024
 MOST_RENDERS = 64
@@ -52,6 +56,7 @@ class Settings:
         log_json: True to write a line of JSON to standard error for each request and stream.
         scenes: folder of scene folders; None for the built-in scenes alone.
         threads: cores to render on; None for all.
+        cluster: Ray cluster that traces: HOST:PORT, `auto` for this machine's, `local` for its own; None for none.
         max_pixels: largest frame [px]; an 8K screen.
         max_samples_per_cell: most camera rays a cell.
         max_depth: most mirrors and boundaries a ray may meet.
@@ -95,6 +100,7 @@ class Settings:
     log_json: bool = False
     scenes: Path | None = None
     threads: int | None = None
+    cluster: str | None = None
     max_pixels: int = 33_177_600
     max_samples_per_cell: int = 256
     max_depth: int = 16
@@ -150,6 +156,8 @@ class Settings:
             require_integer(name, getattr(self, name), 0, MOST_BYTES)
         for name in ("frame_bytes", "max_scene_file_bytes", "max_triangles", "max_texture_pixels", "max_load_bytes"):
             require_integer(name, getattr(self, name), 1, MOST_BYTES)
+        if self.cluster is not None:
+            require_cluster("cluster", self.cluster)
         if self.scenes is not None and not os.path.isdir(self.scenes):
             raise SettingsError("scenes", "a folder", str(self.scenes))
         for origin in self.allowed_origins:
@@ -215,6 +223,27 @@ class Settings:
         }
 
 
+def require_cluster(field: str, address: str) -> None:
+    """Refuse what is no address of a Ray cluster.
+
+    Raises:
+        SettingsError: naming the field.
+    """
+    host, colon, port = address.rpartition(":")
+    if address not in CLUSTERS and not (host and colon and port.isascii() and port.isdigit() and int(port) <= 65_535):
+        raise SettingsError(field, "HOST:PORT, auto or local", address)
+
+
+def require_ray(field: str) -> None:
+    """Refuse a cluster where Ray is not installed.
+
+    Raises:
+        SettingsError: naming the field.
+    """
+    if find_spec("ray") is None:
+        raise SettingsError(field, "Ray: pip install 'gazetrace[cluster]'", "no package ray")
+
+
 def is_loopback(host: str) -> bool:
     """Whether `host` (a name or an address, no port) is this machine as seen from itself."""
     if host.lower().rstrip(".") == "localhost":
@@ -275,6 +304,7 @@ _READ: Mapping[str, Callable[[str, str], object]] = {
     "insecure": _switch,
     "log_json": _switch,
     "scenes": _path,
+    "cluster": _text,
     "allowed_hosts": _list,
     "allowed_origins": _list,
 }

@@ -52,7 +52,7 @@ def test_constraints_pin_every_requirement_and_name_no_host() -> None:
     pinned = {_plain(pin.partition("==")[0]) for pin in pins}
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     extras = project["optional-dependencies"]
-    asked = [*project["dependencies"], *extras["test"], *extras["peers"]]
+    asked = [*project["dependencies"], *extras["test"], *extras["peers"], *extras["cluster"]]
     names = {_plain(match[0]) for text in asked if (match := re.match(r"[\w.-]+", text))}
     assert names <= pinned
 

@@ -81,7 +81,8 @@ def test_the_readme_opens_with_two_commands_that_do_all_the_set_up() -> None:
 def test_what_ci_installs_is_what_the_readme_says() -> None:
     script = (ROOT / ".ci" / "run").read_text()
     assert "pip install -q -c .ci/constraints.txt -e '.[test]'" in script
-    assert "pip install -q -c .ci/constraints.txt -e '.[peers]'" in script
+    for extra in ("peers", "cluster"):
+        assert f"pip install -q -c .ci/constraints.txt -e '.[{extra}]'" in script
     packages = set(re.findall(r"--no-install-recommends (\S+)", script))
     assert packages == {"chromium", "assimp-testmodels", "povray"}
     assert {package for package in packages if f"`{package}`" in README} == packages - {"chromium"}

@@ -7,6 +7,7 @@ import json
 import shlex
 import sys
 from collections.abc import Sequence
+from contextlib import ExitStack
 from dataclasses import asdict
 from datetime import UTC, datetime
 from importlib import metadata
@@ -17,6 +18,7 @@ from clients.command_line.accuracy_folder import AccuracyFolder
 from clients.command_line.accuracy_steps import measure_missing
 from clients.command_line.accuracy_temporal import WALK_S, measure_flicker
 from clients.command_line.accuracy_text import accuracy_text
+from clients.command_line.cluster import add_cluster, check_cluster, joined
 from clients.command_line.errors import OK, UsageError
 from clients.command_line.fingerprint import fingerprint
 from clients.command_line.frame_flags import add_frame_flags, frame_request
@@ -112,6 +114,7 @@ def add(commands: argparse._SubParsersAction[Any]) -> None:
     parser.add_argument("--no-report", action="store_true", help="leave out the page and its plots")
     parser.add_argument("--json", action="store_true", help="print accuracy.json or temporal.json")
     add_threads(parser)
+    add_cluster(parser)
     add_scenes_folder(parser)
     parser.set_defaults(run=run)
 
@@ -131,12 +134,20 @@ def run(arguments: argparse.Namespace) -> int:
     from renderer.workers import available_cores
 
     settings = grid(QUICK if arguments.quick else FULL, prepared.plan)
-    machine = this_machine(arguments.threads or available_cores())
-    with AccuracyFolder(arguments.output, _request(arguments, prepared, view, settings, machine)) as kept:
+    with ExitStack() as stack:
+        cluster = None
+        machine = this_machine(arguments.threads or available_cores())
+        if arguments.cluster is not None:
+            from clients.command_line.accuracy_cluster import machine_of
+
+            cluster = stack.enter_context(joined(arguments.cluster, arguments.threads))
+            machine = machine_of(cluster, prepared)
+        request = _request(arguments, prepared, view, settings, machine)
+        kept = stack.enter_context(AccuracyFolder(arguments.output, request))
         if kept.changed:
             _say(f"{arguments.output} held a measurement of another request ({', '.join(kept.changed)}): starting over")
         try:
-            measure_missing(arguments, prepared, view, settings, kept)
+            measure_missing(arguments, prepared, view, settings, kept, cluster)
         except KeyboardInterrupt:
             _say(f"stopped with {_progress(kept, settings, arguments.repeats)}; the same command goes on")
             raise
@@ -173,6 +184,9 @@ def _complete(arguments: argparse.Namespace) -> None:
     if missing:
         raise UsageError(f"the following arguments are required: {', '.join(missing)}")
     check_threads(arguments.threads)
+    check_cluster(arguments.cluster)
+    if arguments.temporal and arguments.cluster is not None:
+        raise UsageError("--cluster: expected none with --temporal, whose frames follow one another")
     display = Display()
     small = arguments.quick or arguments.temporal
     arguments.size = arguments.size or (QUICK_SIZE if small else (display.width_px, display.height_px))

@@ -17,10 +17,12 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from renderer.accuracy.grid import Setting
+    from renderer.accuracy.measurement import Measured
     from renderer.accuracy.record import Accuracy
     from renderer.frame import FrameRequest
     from renderer.pipeline import Renderer
     from renderer.prepared import PreparedScene
+    from service.cluster.cluster import Cluster
 
 STORE_BYTES: Final = 16 << 30
 """Room for the samples of the reference, of the largest frame even; memory is taken only where it is used."""
@@ -32,8 +34,9 @@ def measure_missing(
     view: FrameRequest,
     settings: Sequence[Setting],
     kept: AccuracyFolder,
+    cluster: Cluster | None = None,
 ) -> None:
-    """Render, compare and time what an earlier run has not."""
+    """Render, compare and time what an earlier run has not, here or on the workers of a cluster."""
     from renderer.accuracy.timing import timed_frame, turn
 
     untimed = [
@@ -44,20 +47,33 @@ def measure_missing(
     ]
     unmeasured = [setting for setting in settings if setting.id not in kept.measured]
     if unmeasured and not kept.holds_radiance:
-        _render_reference(arguments, prepared, view, settings, kept)
+        _render_reference(arguments, prepared, view, settings, kept, cluster)
     if not unmeasured and not untimed:
         return
-    renderer = ready_renderer(arguments.threads, keeps=False)
+    renderer = ready_renderer(arguments.threads, keeps=False) if cluster is None else None
     with counting("comparing settings", len(settings), done=len(settings) - len(unmeasured)) as tick:
-        _measure(renderer, prepared, view, unmeasured, kept, tick)
-    if untimed and not unmeasured:
+        if renderer is not None:
+            _measure(renderer, prepared, view, unmeasured, kept, tick)
+        elif unmeasured and cluster is not None:
+            from clients.command_line.accuracy_cluster import Truth, compare_on
+
+            radiance = kept.radiance((view.display.height_px, view.display.width_px))
+            truth = Truth(view, radiance, prepared.scene.exposure, judges())
+            compare_on(cluster, prepared, unmeasured, truth, kept, tick)
+    if renderer is not None and untimed and not unmeasured:
         timed_frame(renderer, prepared, view, settings[0])  # a first frame of a scene is slow
     total = arguments.repeats * len(settings)
     with counting("timing settings in turn", total, done=total - len(untimed)) as tick:
-        for repeat, setting in untimed:
+        if cluster is not None:
+            from clients.command_line.accuracy_cluster import time_on
+
+            time_on(cluster, prepared, view, untimed, kept, tick)
+        for repeat, setting in () if renderer is None else untimed:
+            assert renderer is not None
             kept.keep_time(setting.id, repeat, timed_frame(renderer, prepared, view, setting))
             tick()
-    renderer.close()
+    if renderer is not None:
+        renderer.close()
 
 
 def _render_reference(
@@ -66,6 +82,7 @@ def _render_reference(
     view: FrameRequest,
     settings: Sequence[Setting],
     kept: AccuracyFolder,
+    cluster: Cluster | None,
 ) -> None:
     from renderer.accuracy.grid import most_samples
     from renderer.accuracy.record import Reference
@@ -74,7 +91,7 @@ def _render_reference(
 
     samples, spared = arguments.reference_samples, most_samples(settings)
     ready_renderer(arguments.threads).close()
-    renderer = Renderer(arguments.threads, store_bytes=STORE_BYTES)
+    renderer = Renderer(arguments.threads, store_bytes=STORE_BYTES, tracing=cluster)
     with counting("rendering the reference", len(rounds(samples, spared))) as tick:
         found = render_reference(renderer, prepared, view, samples, spared, tick)
     renderer.close()
@@ -93,29 +110,49 @@ def _measure(
     """Hold settings against the reference, by every metric there is."""
     if not settings:
         return
+    reference = kept.radiance((view.display.height_px, view.display.width_px))
+    metrics = metrics_of(view, reference, prepared.scene.exposure, judges())
+    for setting in settings:
+        kept.keep_measured(setting.id, *compared(renderer, prepared, view, setting, reference, metrics))
+        tick()
+
+
+def compared(
+    renderer: Renderer,
+    prepared: PreparedScene,
+    view: FrameRequest,
+    setting: Setting,
+    reference: NDArray[np.float32],
+    metrics: Sequence[Metric],
+) -> tuple[Measured, bytes, bytes]:
+    """What one setting is beside the reference, its picture, and the map of its error, both as PNG files."""
     from renderer.accuracy.error_map import error_map
     from renderer.accuracy.measurement import measure
     from renderer.codec import encode
 
     exposure = prepared.scene.exposure
-    reference = kept.radiance((view.display.height_px, view.display.width_px))
-    metrics = _metrics(view, _picture(reference, exposure)[0])
-    for setting in settings:
-        measured, radiance = measure(renderer, prepared, view, setting, reference)
-        pixels, picture = _picture(radiance, exposure)
-        for metric in metrics:
-            measured = replace(measured, accuracy=metric(measured.accuracy, pixels))
-        kept.keep_measured(setting.id, measured, picture, encode(error_map(radiance, reference, exposure), "png"))
-        tick()
+    measured, radiance = measure(renderer, prepared, view, setting, reference)
+    pixels, picture = _picture(radiance, exposure)
+    for metric in metrics:
+        measured = replace(measured, accuracy=metric(measured.accuracy, pixels))
+    return measured, picture, encode(error_map(radiance, reference, exposure), "png")
 
 
-_Metric = Callable[["Accuracy", "NDArray[np.uint8]"], "Accuracy"]
+Metric = Callable[["Accuracy", "NDArray[np.uint8]"], "Accuracy"]
 
 
-def _metrics(view: FrameRequest, reference: NDArray[np.uint8]) -> list[_Metric]:
-    """What fills in the measures of the optional packages that are there."""
-    metrics: list[_Metric] = []
-    if find_spec("flip_evaluator") is not None:
+def judges() -> tuple[str, ...]:
+    """The optional packages that judge pictures, those that are here."""
+    return tuple(package for package in ("flip_evaluator", "pyfvvdp") if find_spec(package) is not None)
+
+
+def metrics_of(
+    view: FrameRequest, radiance: NDArray[np.float32], exposure: float, packages: Sequence[str]
+) -> list[Metric]:
+    """What fills in the measures of some of these packages, beside the reference."""
+    reference = _picture(radiance, exposure)[0]
+    metrics: list[Metric] = []
+    if "flip_evaluator" in packages:
         from renderer.accuracy.flip import flip_errors
 
         def flip(accuracy: Accuracy, pixels: NDArray[np.uint8]) -> Accuracy:
@@ -123,7 +160,7 @@ def _metrics(view: FrameRequest, reference: NDArray[np.uint8]) -> list[_Metric]:
             return replace(accuracy, flip_mean=found.mean, flip_p99=found.p99)
 
         metrics.append(flip)
-    if find_spec("pyfvvdp") is not None:
+    if "pyfvvdp" in packages:
         from renderer.accuracy.vdp import VisibilityMetric
         from renderer.eccentricity import eccentricity_deg
 

@@ -11,11 +11,13 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from fractions import Fraction
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from clients.command_line.clip_text import clip_record, clip_text
+from clients.command_line.cluster import add_cluster, check_cluster, joined
 from clients.command_line.errors import OK, UsageError
 from clients.command_line.fingerprint import fingerprint
 from clients.command_line.frame_flags import add_frame_flags, frame_request
@@ -34,6 +36,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from renderer.frame import FrameRequest
+    from renderer.pipeline import Renderer
     from renderer.prepared import PreparedScene
 
 DESCRIPTION = """\
@@ -106,6 +109,7 @@ def add(commands: argparse._SubParsersAction[Any]) -> None:
     )
     parser.add_argument("--json", action="store_true", help="print what the clip cost as JSON")
     add_threads(parser)
+    add_cluster(parser)
     add_scenes_folder(parser)
     parser.set_defaults(run=run)
 
@@ -113,6 +117,7 @@ def add(commands: argparse._SubParsersAction[Any]) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Render what is missing, put it together, print the cost."""
     check_threads(arguments.threads)
+    check_cluster(arguments.cluster)
     frame_request(arguments, Camera())  # complain about a flag before a scene takes seconds to load
     output = output_of(arguments.output, arguments.size)
     playback = playback_of(arguments)
@@ -246,23 +251,35 @@ def shots_of(
 def render_missing(
     arguments: argparse.Namespace, prepared: PreparedScene, shots: Sequence[FrameRequest], frames: FrameFolder
 ) -> None:
-    """Render the frames that the folder lacks, all through one renderer, which reuses what it has traced."""
+    """Render the frames that the folder lacks; a renderer reuses what it has traced, and so does each worker's."""
     missing = [frame for frame in range(len(shots)) if frame not in frames.costs]
     if not missing:
         return
-    renderer = ready_renderer(arguments.threads)
-    from renderer.codec import encode
-
     with counting(f"rendering {arguments.scene}", len(shots), done=len(shots) - len(missing)) as tick:
+        if arguments.cluster is not None:
+            with joined(arguments.cluster, arguments.threads) as cluster:
+                tasks = [partial(drawn, shots[frame], arguments.overlay) for frame in missing]
+                for number, (picture, cost) in cluster.run(prepared, tasks):
+                    frames.add(missing[number], picture, cost)
+                    tick()
+            return
+        renderer = ready_renderer(arguments.threads)
         for frame in missing:
-            rendered = renderer.render(prepared, shots[frame])
-            started_ns = time.perf_counter_ns()
-            pixels = draw_overlays(rendered.pixels, shots[frame], renderer, arguments.overlay)
-            picture = encode(pixels, "png")
-            cost = cost_record(rendered, shots[frame], {"encode": milliseconds_since(started_ns)})
-            frames.add(frame, picture, cost)
+            frames.add(frame, *drawn(shots[frame], arguments.overlay, renderer, prepared))
             tick()
     renderer.close()
+
+
+def drawn(
+    shot: FrameRequest, overlay: list[str], renderer: Renderer, prepared: PreparedScene, _: object = None
+) -> tuple[bytes, dict[str, Any]]:
+    """One frame as a PNG file, and what it cost."""
+    from renderer.codec import encode
+
+    rendered = renderer.render(prepared, shot)
+    started_ns = time.perf_counter_ns()
+    picture = encode(draw_overlays(rendered.pixels, shot, renderer, overlay), "png")
+    return picture, cost_record(rendered, shot, {"encode": milliseconds_since(started_ns)})
 
 
 def assemble(video: Path, frames: FrameFolder, count: int, fps: Fraction, size: tuple[int, int]) -> None:

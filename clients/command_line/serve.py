@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import Field, fields
 from typing import Any
 
+from clients.command_line.cluster import check_cluster
 from clients.command_line.errors import OK, UsageError
 from renderer.errors import SettingsError
 from service.settings import VARIABLE_PREFIX, Settings
@@ -27,6 +28,9 @@ examples:
 
   gazetrace serve --port 9000 --scenes-folder my-scenes --threads 4
       With the scenes my-scenes/NAME/scene.toml beside the built-in ones, on four cores.
+
+  gazetrace serve --cluster render.example:6379
+      Traced by every machine of the Ray cluster whose head that is; `local` starts one on this machine.
 
   GAZETRACE_TOKEN=a-long-secret gazetrace serve --host 0.0.0.0
       For other machines too. They send the header `Authorization: Bearer a-long-secret`."""
@@ -59,6 +63,7 @@ def add(commands: argparse._SubParsersAction[Any]) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Serve until stopped."""
     settings = settings_of(arguments, os.environ)
+    check_cluster(settings.cluster)
     from service.supervisor import serve
 
     serve(settings, announce, debug=arguments.debug)
@@ -102,7 +107,7 @@ def setting_texts(record: type[Any] = Settings) -> dict[str, str]:
 
 
 def _metavar(setting: Field[Any]) -> str:
-    kinds = {"port": "PORT", "host": "ADDRESS", "token": "TOKEN", "scenes": "DIR"}
+    kinds = {"port": "PORT", "host": "ADDRESS", "token": "TOKEN", "scenes": "DIR", "cluster": "ADDRESS"}
     return kinds.get(setting.name, "A,B" if isinstance(setting.default, tuple) else "N")
 
 

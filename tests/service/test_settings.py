@@ -20,6 +20,7 @@ STATED = {
     "insecure": ("yes", True),
     "log_json": ("on", True),
     "threads": ("3", 3),
+    "cluster": ("render.example:6379", "render.example:6379"),
     "max_pixels": ("1000", 1000),
     "max_samples_per_cell": ("8", 8),
     "max_depth": ("2", 2),
@@ -78,6 +79,9 @@ def test_empty_and_foreign_variables_state_nothing() -> None:
     ("variable", "text"),
     [
         ("GAZETRACE_PORT", "http"),
+        ("GAZETRACE_CLUSTER", "render.example"),
+        ("GAZETRACE_CLUSTER", "render.example:70000"),
+        ("GAZETRACE_CLUSTER", ":6379"),
         ("GAZETRACE_PORT", "65536"),
         ("GAZETRACE_PORT", "-1"),
         ("GAZETRACE_THREADS", "0"),
