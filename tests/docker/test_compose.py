@@ -20,7 +20,7 @@ SERVICES: dict[str, dict[str, Any]] = COMPOSE["services"]
 def test_the_service_runs_alone_unless_more_is_asked_for() -> None:
     profiles = {name: tuple(service.get("profiles", ())) for name, service in SERVICES.items()}
     assert [name for name, asked in profiles.items() if not asked] == ["gazetrace"]
-    assert {profile for asked in profiles.values() for profile in asked} == {"bridge", "monitoring"}
+    assert {profile for asked in profiles.values() for profile in asked} == {"bridge", "cluster", "monitoring"}
     text = (DOCKER / "README.md").read_text()
     assert all(f"--profile {profile}" in text for asked in profiles.values() for profile in asked)
 
@@ -57,6 +57,11 @@ def test_everything_that_is_named_exists(name: str) -> None:
 def test_commands_of_ours_are_ones(name: str) -> None:
     service = SERVICES[name]
     words = service.get("command", ["serve"])
+    if service.get("entrypoint") == ["ray"]:
+        assert words[0] == "start"
+        return
+    if service.get("entrypoint") == ["sh", "-c"]:
+        words = words[0].partition("exec gazetrace ")[2].split()
     assert build_parser().parse_args(words).run is not None
 
 

@@ -15,7 +15,7 @@ from tests.clients.commands import PATIENCE_S, ROOT
 
 DOCKER = ROOT / "docker"
 DOCKERFILE = (DOCKER / "Dockerfile").read_text()
-SETS_OF_PACKAGES: dict[str, tuple[str, ...]] = {"service": ()}
+SETS_OF_PACKAGES: dict[str, tuple[str, ...]] = {"service": (), "cluster": ("cluster",)}
 """Files of docker/requirements, and the extras whose packages they hold."""
 
 
