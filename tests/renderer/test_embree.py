@@ -19,7 +19,7 @@ Rays = tuple[NDArray[np.float32], NDArray[np.float32]]
 
 @pytest.fixture(autouse=True)
 def need_packets() -> None:
-    if embree.packets() is None:
+    if embree.embree_library() is None:
         pytest.skip("this processor or this Embree traces no packets")
 
 
@@ -155,19 +155,19 @@ def test_another_embree_means_single_rays_and_a_line_in_the_log(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     """A packet width that the library's functions do not have gets wrong answers, which is noticed."""
-    known = embree.packets()
+    known = embree.embree_library()
     assert known is not None
     wrong = known._replace(width=4 if known.width != 4 else 8)
     monkeypatch.setattr(embree, "_open_library", lambda: wrong)
     with caplog.at_level(logging.WARNING, "renderer.embree"):
-        assert embree.packets.__wrapped__() is None
+        assert embree.embree_library.__wrapped__() is None
     assert "singly" in caplog.text
     caplog.clear()
 
-    def absent() -> embree.Packets:
+    def absent() -> embree.Library:
         raise OSError("embreex comes without an Embree library of its own")
 
     monkeypatch.setattr(embree, "_open_library", absent)
     with caplog.at_level(logging.WARNING, "renderer.embree"):
-        assert embree.packets.__wrapped__() is None
+        assert embree.embree_library.__wrapped__() is None
     assert "without an Embree library" in caplog.text

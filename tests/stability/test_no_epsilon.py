@@ -10,9 +10,9 @@ import renderer
 
 GEOMETRY = (
     "area_light", "ashikhmin_shirley", "camera", "cutout", "direction", "embree", "footprint", "fresnel", "grain",
-    "intersection", "light_reach", "light_samples", "lighting", "media", "nested", "normal_map", "placement",
-    "polygon", "prepared", "rays", "reflectance", "sampling", "shading", "shared_face", "sphere", "surface",
-    "tangent", "whitted",
+    "intersection", "light_reach", "light_samples", "lighting", "media", "nested", "normal_map", "packets",
+    "placement", "polygon", "prepared", "rays", "reflectance", "sampling", "shading", "shared_face", "sphere",
+    "surface", "tangent", "whitted",
 )  # fmt: skip
 """Modules of the renderer that rays and the surfaces they meet pass through."""
 
@@ -23,10 +23,10 @@ SHARES = {
     "area_light.SMALLEST_SPHERICAL": "a solid angle in steradians",
     "area_light.IN_PLANE": "of a light's distance: 16 float32 spacings",
     "camera.Camera": "the smallest field of view in degrees, and the sine of an angle between unit vectors",
-    "embree.BEYOND": "of the distance of the nearest hit: 30 float32 roundings",
-    "embree.PARALLEL": "of a direction's largest part",
-    "embree.NEAR_EDGE": "a barycentric weight",
-    "embree.ASIDE": "of a direction's largest part: 4 float32 spacings",
+    "packets.BEYOND": "of the distance of the nearest hit: 30 float32 roundings",
+    "packets.PARALLEL": "of a direction's largest part",
+    "packets.NEAR_EDGE": "a barycentric weight",
+    "packets.ASIDE": "of a direction's largest part: 4 float32 spacings",
     "polygon._FLAT": "the sine of an angle",
     "prepared.FLAT_NORMAL": "a difference between unit vectors",
     "sampling.TO_UNIT": "32-bit integers to [0, 1)",
