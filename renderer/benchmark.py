@@ -30,13 +30,15 @@ GAZE_STEP_PX = 20.0
 
 FRAME = "whole frame"
 BARE = "bare Embree"
+PACKETS = "its rays in packets"
 MAP = "cell map"
 TRACE = "trace"
 RECONSTRUCT = "reconstruct and tone map"
 MOVED = "after a 20 px gaze move"
 STORED = "everything stored"
-"""What is timed: the frame traced anew with its map cached and without encoding; Embree alone on the same
-rays and as many threads; building the map; the frame's other stages; and the frame with the sample store warm.
+"""What is timed: the frame traced anew with its map cached and without encoding; Embree alone on the same rays and as
+many threads; these rays as the renderer has them traced, without shading; building the map; the frame's other stages;
+and the frame with the sample store warm.
 """
 
 _Result = TypeVar("_Result")
@@ -112,7 +114,9 @@ def measure_frame(
     first = renderer.render(replace(prepared, intersector=recorder), request)  # type: ignore[arg-type]
     pool = WorkerPool(renderer.threads)
     moved = replace(request, gaze=Gaze(request.gaze.x + GAZE_STEP_PX, request.gaze.y))
-    times: dict[str, list[float]] = {name: [] for name in (FRAME, BARE, MAP, TRACE, RECONSTRUCT, MOVED, STORED)}
+    times: dict[str, list[float]] = {
+        name: [] for name in (FRAME, BARE, PACKETS, MAP, TRACE, RECONSTRUCT, MOVED, STORED)
+    }
 
     def timed(name: str, action: Callable[[], _Result]) -> _Result:
         began = time.perf_counter()
@@ -121,12 +125,16 @@ def measure_frame(
         return result
 
     renderer.render(prepared, moved)
+    intersector = prepared.intersector
+    bare, packets = (intersector.bare_nearest, intersector.bare_occluded), (intersector.nearest, intersector.occluded)
+    _trace_rays(recorder, pool, *bare)  # its search tree is built at the first use
     for _ in range(repeats):
         renderer.forget_samples()
         frame = timed(FRAME, lambda: renderer.render(prepared, request))
         times[TRACE].append(frame.cost.time_ms.trace)
         times[RECONSTRUCT].append(frame.cost.time_ms.reconstruct)
-        timed(BARE, lambda: _trace_bare(prepared.intersector, recorder, pool))
+        timed(BARE, lambda: _trace_rays(recorder, pool, *bare))
+        timed(PACKETS, lambda: _trace_rays(recorder, pool, *packets))
         timed(MOVED, lambda: renderer.render(prepared, moved))
         timed(STORED, lambda: renderer.render(prepared, request))
         timed(MAP, lambda: _build_map(request, pool))
@@ -141,25 +149,31 @@ def _build_map(request: FrameRequest, pool: WorkerPool) -> None:
     build_cell_map(quality.map, request.display, quality.acuity, bucket, pool)
 
 
-def _trace_bare(intersector: Intersector, recorder: _RecordingIntersector, pool: WorkerPool) -> None:
-    """Put the recorded rays through Embree alone, batch by batch on all threads."""
-    nearest, shadow = recorder.nearest_rays, recorder.shadow_rays
+def _trace_rays(
+    recorder: _RecordingIntersector,
+    pool: WorkerPool,
+    nearest: Callable[[NDArray[np.float32], NDArray[np.float32]], object],
+    occluded: Callable[[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]], object],
+) -> None:
+    """Trace the recorded rays and do nothing else, batch by batch on all threads."""
+    seen, shadow = recorder.nearest_rays, recorder.shadow_rays
     reaches = [reach.copy() for _, _, reach in shadow]
 
     def trace(batch: int) -> None:
-        if batch < len(nearest):
-            intersector.bare_nearest(*nearest[batch])
+        if batch < len(seen):
+            nearest(*seen[batch])
         else:
-            origin, direction, _ = shadow[batch - len(nearest)]
-            intersector.bare_occluded(origin, direction, reaches[batch - len(nearest)])
+            origin, direction, _ = shadow[batch - len(seen)]
+            occluded(origin, direction, reaches[batch - len(seen)])
 
-    pool.run(trace, len(nearest) + len(shadow))
+    pool.run(trace, len(seen) + len(shadow))
 
 
 def _figures(times: dict[str, list[float]]) -> tuple[Figure, ...]:
     figures = [_figure(name, series, "ms") for name, series in times.items()]
     for part, whole in (
         (FRAME, BARE),
+        (PACKETS, BARE),
         (MAP, BARE),
         (TRACE, BARE),
         (RECONSTRUCT, BARE),

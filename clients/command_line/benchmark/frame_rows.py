@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from clients.command_line.benchmark.job import Job
 from clients.command_line.benchmark.row import Row, figure_row, measured_row, missing_row
-from renderer.benchmark import BARE, FRAME, MAP, MOVED, RECONSTRUCT, measure_frame
+from renderer.benchmark import BARE, FRAME, MAP, MOVED, PACKETS, RECONSTRUCT, measure_frame
 from renderer.frame import FrameRequest
 from renderer.pipeline import Renderer
 from renderer.workers import available_cores
@@ -29,6 +29,7 @@ def frame_rows(job: Job) -> tuple[Row, ...]:
         figure_row("frame", FRAME, figures[FRAME], note=note),
         figure_row("frame", f"{BARE}, its rays", figures[BARE]),
         figure_row("frame", f"{FRAME} / {BARE}", figures[f"{FRAME} / {BARE}"], aim=FRAME_AIM),
+        figure_row("frame", f"{PACKETS} / {BARE}", figures[f"{PACKETS} / {BARE}"], note="tracing alone"),
         figure_row("frame", f"{MOVED} / {FRAME}", figures[f"{MOVED} / {FRAME}"], aim=MOVED_AIM),
         figure_row("frame", f"new cell map / {FRAME}", figures[f"{MAP} / {FRAME}"], aim=MAP_AIM),
         figure_row("frame", f"{RECONSTRUCT} / {FRAME}", figures[f"{RECONSTRUCT} / {FRAME}"], aim=RECONSTRUCT_AIM),
@@ -39,9 +40,12 @@ def sample_rows(job: Job) -> tuple[Row, ...]:
     """The same with many samples a cell."""
     result = measure_frame(job.renderer, job.prepared, job.with_samples(job.many), job.heavy_repeats, lambda: None)
     figures = {figure.name: figure for figure in result.figures}
-    what = f"{FRAME} / {BARE}, {job.many} samples"
     note = f"{result.rays.total:,} rays"
-    return (figure_row("samples", what, figures[f"{FRAME} / {BARE}"], aim=MANY_AIM, note=note),)
+    whole, tracing = f"{FRAME} / {BARE}", f"{PACKETS} / {BARE}"
+    return (
+        figure_row("samples", f"{whole}, {job.many} samples", figures[whole], aim=MANY_AIM, note=note),
+        figure_row("samples", f"{tracing}, {job.many} samples", figures[tracing], note="tracing alone"),
+    )
 
 
 def thread_rows(job: Job) -> tuple[Row, ...]:
