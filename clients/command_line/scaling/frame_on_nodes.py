@@ -2,7 +2,7 @@
 
 What is simulated is time: a thread of the service that does one thing at a time, a wire that carries one piece at a
 time each way, and workers whose pieces take now longer, now shorter. Each worker has a share and does its pieces in
-order; who has none left takes over the last one of who has most.
+order; who has none left takes over the last one of who has most. How many there are is what the cluster goes by.
 """
 
 from __future__ import annotations
@@ -17,18 +17,8 @@ from itertools import pairwise
 import numpy as np
 
 from clients.command_line.scaling.rates import Machine, Rates, Work
-
-WORTH_S = 0.005
-"""Work for which another worker is asked [s]."""
-
-PIECES = 3
-"""Pieces of a worker's share."""
-
-SHORTEST_S, LONGEST_S = 0.01, 0.25
-"""Bounds on the time of a piece [s]: for less it is not sent alone, and with more too much would be lost."""
-
-AHEAD = 2
-"""Pieces that a worker has at once: one that it traces, one on its way."""
+from service.cluster.cluster import LONGEST_S, PIECES, SHORTEST_S, WORTH_S
+from service.cluster.errand import AHEAD
 
 
 @dataclass(frozen=True, slots=True)

@@ -33,12 +33,12 @@ class Rates:
         spread: standard deviation of the time a piece takes, over its mean.
     """
 
-    samples_per_s: float = 1.05e6
+    samples_per_s: float = 1.3e6
     map_px_per_s: float = 6.1e7
     picture_px_per_s: float = 8.0e7
     encode_px_per_s: float = 3.0e8
-    pack_cells_per_s: float = 2.5e7
-    take_cells_per_s: float = 3.0e7
+    pack_cells_per_s: float = 2.4e7
+    take_cells_per_s: float = 1.6e7
     bytes_out_per_cell: float = 1.0
     bytes_back_per_sample: float = 12.0
     most_bytes_back_per_cell: float = 20.0
