@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import json
 import shlex
-import sys
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import asdict
@@ -24,7 +23,7 @@ from clients.command_line.fingerprint import fingerprint
 from clients.command_line.frame_flags import add_frame_flags, frame_request
 from clients.command_line.gaze_trace_flags import SIMULATED, add_gaze_trace_flags
 from clients.command_line.numerics_text import numerics_record, numerics_text
-from clients.command_line.progress import counting
+from clients.command_line.progress import counting, say
 from clients.command_line.render import add_threads, check_threads, write_whole
 from clients.command_line.scene_argument import SCENE_HELP, add_scenes_folder, load_scene
 from renderer.camera import Camera
@@ -145,11 +144,11 @@ def run(arguments: argparse.Namespace) -> int:
         request = _request(arguments, prepared, view, settings, machine)
         kept = stack.enter_context(AccuracyFolder(arguments.output, request))
         if kept.changed:
-            _say(f"{arguments.output} held a measurement of another request ({', '.join(kept.changed)}): starting over")
+            say(f"{arguments.output} held a measurement of another request ({', '.join(kept.changed)}): starting over")
         try:
             measure_missing(arguments, prepared, view, settings, kept, cluster)
         except KeyboardInterrupt:
-            _say(f"stopped with {_progress(kept, settings, arguments.repeats)}; the same command goes on")
+            say(f"stopped with {_progress(kept, settings, arguments.repeats)}; the same command goes on")
             raise
         kept.finish()
         report = _report(arguments, prepared, view, settings, machine, kept)
@@ -300,7 +299,3 @@ def _write(folder: Path, report: AccuracyReport, *, draw: bool) -> list[Path]:
 def _progress(kept: AccuracyFolder, settings: Sequence[Setting], repeats: int) -> str:
     timed = sum(len(times) for times in kept.times.values())
     return f"{len(kept.measured)} of {len(settings)} settings compared and {timed} of {repeats * len(settings)} timed"
-
-
-def _say(text: str) -> None:
-    print(f"gazetrace: {text}", file=sys.stderr)

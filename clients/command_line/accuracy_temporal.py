@@ -5,15 +5,18 @@ from __future__ import annotations
 import argparse
 import math
 import shlex
+from dataclasses import asdict
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from clients.command_line.errors import OK, UsageError
+from clients.command_line.fingerprint import fingerprint
 from clients.command_line.frame_flags import frame_request
 from clients.command_line.gaze_trace_flags import playback_of
-from clients.command_line.progress import counting
+from clients.command_line.journal import Journal
+from clients.command_line.progress import counting, say
 from clients.command_line.render import ready_renderer, write_whole
 from clients.command_line.scene_argument import load_scene
 from clients.command_line.temporal_text import temporal_text
@@ -22,6 +25,7 @@ from renderer.gaze import Gaze
 from renderer.quality import Quality
 
 if TYPE_CHECKING:
+    from renderer.accuracy.temporal import FlickerStep
     from renderer.accuracy.temporal_record import TemporalReport
     from renderer.display import Display
     from renderer.frame import FrameRequest
@@ -34,6 +38,9 @@ FRAMES_PER_SECOND: Final = 25.0
 
 MOST_GAZES: Final = 10_000
 
+LOG: Final = "temporal.jsonl"
+"""The steps that are measured, for the same command to go on after."""
+
 
 def measure_flicker(arguments: argparse.Namespace) -> int:
     """Render the walk in each way, write what changed, print it; with a page where one measures the scene already."""
@@ -41,12 +48,21 @@ def measure_flicker(arguments: argparse.Namespace) -> int:
     walk = walk_of(arguments, view.display)
     prepared = load_scene(arguments.scene, arguments.scenes_folder)
     view = frame_request(arguments, prepared.scene.camera, quality=Quality())
-    report = _measured(arguments, prepared, view, walk)
+    folder: Path = arguments.output
+    folder.mkdir(exist_ok=True)
+    with Journal(folder / LOG, _request(arguments, prepared, view, walk)) as journal:
+        if journal.changed:
+            say(f"{folder} held a walk of another request ({', '.join(journal.changed)}): starting over")
+            journal.start_over()
+        steps = _Steps(journal)
+        try:
+            report = _measured(arguments, prepared, view, walk, steps)
+        except KeyboardInterrupt:
+            say(f"stopped with {len(journal.records)} steps of the gaze measured; the same command goes on")
+            raise
     from renderer.accuracy.record import report_json
     from renderer.accuracy.table import csv_text
 
-    folder: Path = arguments.output
-    folder.mkdir(exist_ok=True)
     files = [folder / "temporal.json", folder / "temporal.csv"]
     for path, text in zip(files, (report_json(report), csv_text(report.ways)), strict=True):
         write_whole(path, text.encode())
@@ -74,24 +90,29 @@ def walk_of(arguments: argparse.Namespace, display: Display) -> list[Gaze]:
 
 
 def _measured(
-    arguments: argparse.Namespace, prepared: PreparedScene, view: FrameRequest, walk: list[Gaze]
+    arguments: argparse.Namespace, prepared: PreparedScene, view: FrameRequest, walk: list[Gaze], steps: _Steps
 ) -> TemporalReport:
+    """Measure the steps that an earlier run has not, and put all of them together."""
     from renderer.accuracy.machine import this_machine
-    from renderer.accuracy.temporal import WAYS, flicker
+    from renderer.accuracy.temporal import WAYS, flicker, flicker_steps
     from renderer.accuracy.temporal_record import TemporalReport
+    from renderer.workers import available_cores
 
-    renderer = ready_renderer(arguments.threads)
-    ways = []
-    with counting(f"moving the gaze over {arguments.scene}", len(WAYS) * len(walk)) as tick:
-        for way in WAYS:
-            ways.append(flicker(renderer, prepared, view, walk, way, tick))
-            renderer.forget_samples()
-    renderer.close()
+    total, done = len(WAYS) * (len(walk) - 1), sum(len(steps.of(way)) for way in WAYS)
+    if done < total:
+        renderer = ready_renderer(arguments.threads)
+        with counting(f"moving the gaze over {arguments.scene}", total, done) as tick:
+            for way in WAYS:
+                for step in flicker_steps(renderer, prepared, view, walk, way, len(steps.of(way))):
+                    steps.keep(way, step)
+                    tick()
+                renderer.forget_samples()
+        renderer.close()
     return TemporalReport(
         version=metadata.version("gazetrace"),
         command=shlex.join(["gazetrace", *arguments.words]),
         made=datetime.now(UTC).isoformat(timespec="seconds"),
-        machine=this_machine(renderer.threads),
+        machine=this_machine(arguments.threads or available_cores()),
         scene=arguments.scene,
         display=view.display,
         camera=view.camera or prepared.scene.camera,
@@ -99,8 +120,48 @@ def _measured(
         gaze_trace=arguments.gaze_trace,
         frames_per_second=FRAMES_PER_SECOND,
         gazes=tuple(walk),
-        ways=tuple(ways),
+        ways=tuple(flicker(way, steps.of(way)) for way in WAYS),
     )
+
+
+class _Steps:
+    """The steps measured so far, by way, in the journal of a folder."""
+
+    def __init__(self, journal: Journal) -> None:
+        from renderer.accuracy.record import read_record
+        from renderer.accuracy.temporal import FlickerStep
+
+        self._journal = journal
+        self._steps: dict[str, list[FlickerStep]] = {}
+        for record in journal.records:
+            if "step" in record:
+                self.of(record["way"]).append(read_record(FlickerStep, record["step"]))
+
+    def of(self, way: str) -> list[FlickerStep]:
+        """Those of one way, in their order."""
+        return self._steps.setdefault(way, [])
+
+    def keep(self, way: str, step: FlickerStep) -> None:
+        """Keep the next one."""
+        self._journal.add({"way": way, "step": asdict(step)})
+        self.of(way).append(step)
+
+
+def _request(
+    arguments: argparse.Namespace, prepared: PreparedScene, view: FrameRequest, walk: list[Gaze]
+) -> dict[str, Any]:
+    """What decides the result."""
+    from renderer.version import source_hash
+
+    return {
+        "renderer": source_hash(),
+        "scene": fingerprint(prepared.scene),
+        "size": list(arguments.size),
+        "screen": asdict(view.display),
+        "camera": fingerprint(view.camera),
+        "quality": asdict(view.quality),
+        "gazes": fingerprint(walk),
+    }
 
 
 def _draw(folder: Path) -> list[Path]:

@@ -6,7 +6,6 @@ import argparse
 import json
 import math
 import re
-import sys
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -23,7 +22,7 @@ from clients.command_line.fingerprint import fingerprint
 from clients.command_line.frame_flags import add_frame_flags, frame_request
 from clients.command_line.frame_folder import FrameFolder
 from clients.command_line.gaze_trace_flags import Playback, add_gaze_trace_flags, playback_of
-from clients.command_line.progress import counting, milliseconds_since
+from clients.command_line.progress import counting, milliseconds_since, say
 from clients.command_line.render import OVERLAYS, add_threads, check_threads, cost_record, draw_overlays, ready_renderer
 from clients.command_line.scene_argument import SCENE_HELP, add_scenes_folder, load_scene
 from renderer.camera import Camera
@@ -142,12 +141,12 @@ def run(arguments: argparse.Namespace) -> int:
     }
     with FrameFolder(output.folder, output.pattern, request) as frames:
         if frames.changed:
-            _say(f"{output.folder} held frames of another request ({', '.join(frames.changed)}): starting over")
+            say(f"{output.folder} held frames of another request ({', '.join(frames.changed)}): starting over")
         earlier = len(frames.costs)
         try:
             render_missing(arguments, prepared, shots, frames)
         except KeyboardInterrupt:
-            _say(f"stopped with {len(frames.costs)} of {count} frames; the same command goes on")
+            say(f"stopped with {len(frames.costs)} of {count} frames; the same command goes on")
             raise
         costs = [frames.costs[frame] for frame in range(count)]
         if output.video is not None:
@@ -297,7 +296,3 @@ def _pictures(frames: FrameFolder, count: int, tick: Any) -> Iterator[NDArray[np
         path = frames.path(frame)
         yield decode_texture(path.read_bytes(), str(path)).pixels
         tick()
-
-
-def _say(text: str) -> None:
-    print(f"gazetrace: {text}", file=sys.stderr)

@@ -52,6 +52,11 @@ def counting(text: str, total: int, done: int = 0) -> Iterator[Callable[[], None
         yield lambda: progress.advance(task)
 
 
+def say(text: str) -> None:
+    """One line for whoever waits."""
+    print(f"gazetrace: {text}", file=sys.stderr)
+
+
 def milliseconds_since(start_ns: int) -> float:
     """Wall-clock time since `start_ns` of `time.perf_counter_ns` [ms]."""
     return (time.perf_counter_ns() - start_ns) / 1e6

@@ -8,7 +8,7 @@ samples of the scene.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -19,7 +19,7 @@ from renderer.acuity import MAX_MARGIN_DEG
 from renderer.cellmap import CellMap
 from renderer.eccentricity import eccentricity_deg
 from renderer.frame import FrameRequest
-from renderer.gaze import Gaze
+from renderer.gaze import Gaze, GazeBucket
 from renderer.pipeline import Renderer
 from renderer.prepared import PreparedScene
 from renderer.quality import Quality
@@ -37,6 +37,23 @@ WAYS: Final = (SCANLINE, ALIGNED, STEADY)
 
 
 @dataclass(frozen=True, slots=True)
+class FlickerStep:
+    """What changes from one gaze of a walk to the next; attributes as in `Flicker`, of this step alone.
+
+    Attributes:
+        new_map: whether the map is another one.
+        cells: of the later map.
+    """
+
+    new_map: bool
+    cells: int
+    changed_pixels: float
+    change: float
+    peripheral_change: float | None
+    kept_cells_change: float
+
+
+@dataclass(frozen=True, slots=True)
 class Flicker:
     """What changes from one gaze of a walk to the next, with one way of mapping; means over all steps of the walk.
 
@@ -44,7 +61,7 @@ class Flicker:
         way: one of `WAYS`.
         steps: from one gaze to the next.
         map_changes: how many of them changed the map.
-        cells: mean number of cells.
+        cells: mean number of cells after a step.
         changed_pixels: share of the pixels that got another cell.
         change: mean absolute difference of luminance as the screen shows it, linear, 0 to 1, over all pixels.
         peripheral_change: the same over pixels 5 deg and more from the later gaze; None where there are none.
@@ -71,58 +88,61 @@ class _Moment:
     light: NDArray[np.float64]
 
 
-def flicker(
-    renderer: Renderer,
-    prepared: PreparedScene,
-    view: FrameRequest,
-    walk: Sequence[Gaze],
-    way: str,
-    tick: Callable[[], None] = lambda: None,
-) -> Flicker:
-    """Render a walk of the gaze and measure what changes.
+def flicker_steps(
+    renderer: Renderer, prepared: PreparedScene, view: FrameRequest, walk: Sequence[Gaze], way: str, begin: int = 0
+) -> Iterator[FlickerStep]:
+    """Render a walk of the gaze and tell after each step what has changed.
 
     Args:
         renderer: keeps samples between frames, or it takes longer; what it kept changes nothing.
         prepared: the scene.
         view: display, camera and quality (of its map only the bucket); its gaze does not count.
-        walk: two gazes or more, as far apart in time as frames are.
+        walk: the gazes, as far apart in time as frames are.
         way: one of `WAYS`.
-        tick: called after each gaze.
+        begin: the step to begin with, from 0; it and those after it are the same as with 0.
+    """
+    quality = _quality(view, way)
+    before: _Moment | None = None
+    for index, gaze in list(enumerate(_rendered_for(walk, way, quality.gaze_bucket_px)))[begin:]:
+        now = _moment(renderer, prepared, replace(view, gaze=gaze, quality=quality, linear=True), before)
+        if before is not None:
+            yield _step(before, now, eccentricity_deg(view.display, walk[index]) >= PERIPHERY_DEG)
+        before = now
+
+
+def flicker(way: str, steps: Sequence[FlickerStep]) -> Flicker:
+    """The steps of a walk put together.
 
     Raises:
-        ValueError: for a walk without a step.
+        ValueError: if there are none.
     """
-    if len(walk) < 2:
-        raise ValueError(f"walk: expected two gazes or more, found {len(walk)}")
-    quality = _quality(view, way)
-    changed, changes, peripheral, kept, cells = [], [], [], [0.0], []
-    before: _Moment | None = None
-    map_changes = 0
-    for gaze in walk:
-        now = _moment(renderer, prepared, replace(view, gaze=gaze, quality=quality, linear=True), way, before)
-        if before is not None:
-            map_changes += now.cells.bucket != before.cells.bucket
-            other = _other_cell(before.cells, now.cells)
-            difference = np.abs(now.light - before.light)
-            far = eccentricity_deg(view.display, gaze) >= PERIPHERY_DEG
-            changed.append(float(other.mean()))
-            changes.append(float(difference.mean()))
-            kept.append(float(difference[~other].max(initial=0.0)))
-            if far.any():
-                peripheral.append(float(difference[far].mean()))
-        cells.append(now.cells.cells)
-        before = now
-        tick()
+    if not steps:
+        raise ValueError("steps: expected one or more, found none: a walk has two gazes or more")
+    far = [step.peripheral_change for step in steps if step.peripheral_change is not None]
     return Flicker(
         way=way,
-        steps=len(changes),
-        map_changes=map_changes,
-        cells=float(np.mean(cells)),
-        changed_pixels=float(np.mean(changed)),
-        change=float(np.mean(changes)),
-        peripheral_change=float(np.mean(peripheral)) if peripheral else None,
-        kept_cells_change=max(kept),
-        step_changes=tuple(changes),
+        steps=len(steps),
+        map_changes=sum(step.new_map for step in steps),
+        cells=float(np.mean([step.cells for step in steps])),
+        changed_pixels=float(np.mean([step.changed_pixels for step in steps])),
+        change=float(np.mean([step.change for step in steps])),
+        peripheral_change=float(np.mean(far)) if far else None,
+        kept_cells_change=max(step.kept_cells_change for step in steps),
+        step_changes=tuple(step.change for step in steps),
+    )
+
+
+def _step(before: _Moment, now: _Moment, far: NDArray[np.bool_]) -> FlickerStep:
+    """From one moment to the next; `far`, (h, w), are the pixels that count as peripheral."""
+    other = _other_cell(before.cells, now.cells)
+    difference = np.abs(now.light - before.light)
+    return FlickerStep(
+        new_map=now.cells.bucket != before.cells.bucket,
+        cells=now.cells.cells,
+        changed_pixels=float(other.mean()),
+        change=float(difference.mean()),
+        peripheral_change=float(difference[far].mean()) if far.any() else None,
+        kept_cells_change=float(difference[~other].max(initial=0.0)),
     )
 
 
@@ -137,15 +157,17 @@ def _quality(view: FrameRequest, way: str) -> Quality:
     return replace(quality, acuity=replace(acuity, margin_deg=min(margin, MAX_MARGIN_DEG)))
 
 
-def _moment(
-    renderer: Renderer, prepared: PreparedScene, request: FrameRequest, way: str, before: _Moment | None
-) -> _Moment:
-    """What is shown for a gaze; with hysteresis, for the bucket that it is taken to be in."""
-    if way == STEADY:
-        bucket = steady_bucket(
-            before.cells.bucket if before is not None else None, request.gaze, request.quality.gaze_bucket_px
-        )
-        request = replace(request, gaze=within(bucket, request.gaze))
+def _rendered_for(walk: Sequence[Gaze], way: str, side_px: int) -> Iterator[Gaze]:
+    """The gazes that frames are rendered for; with hysteresis, within the bucket that each is taken to be in."""
+    bucket: GazeBucket | None = None
+    for gaze in walk:
+        if way == STEADY:
+            bucket = steady_bucket(bucket, gaze, side_px)
+        yield gaze if bucket is None else within(bucket, gaze)
+
+
+def _moment(renderer: Renderer, prepared: PreparedScene, request: FrameRequest, before: _Moment | None) -> _Moment:
+    """What is shown for a gaze, which is what was shown before if the map is."""
     cells, _ = renderer.cell_map(request.display, request.quality, request.gaze)
     if before is not None and cells.bucket == before.cells.bucket:
         return before

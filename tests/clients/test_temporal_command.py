@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from clients.command_line import main
+from clients.command_line.accuracy_temporal import LOG
 from tests.clients.accuracy_record import record, write_measurement
 from tests.clients.commands import failing
 
@@ -66,6 +67,31 @@ def test_the_table_and_the_section_of_the_page(capsys: pytest.CaptureFixture[str
     assert said.endswith("\nfound/temporal.json\nfound/temporal.csv\n")
     assert "report.html" not in said
     assert len(json.loads((tmp_path / "found" / "temporal.json").read_text())["gazes"]) == 5
+
+
+def test_a_walk_that_was_stopped_goes_on(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """What is left of the first run: all steps of one way, one of the next, half a line."""
+    words = ["accuracy", "matte", *SMALL, "--seconds", "0.2", "--no-report", "--json", "-o", "found"]
+    assert main(words) == 0
+    whole = json.loads(capsys.readouterr().out)
+    log = tmp_path / "found" / LOG
+    kept = log.read_bytes()
+    lines = kept.splitlines(keepends=True)
+    assert len(lines) == 1 + 3 * 4
+    log.write_bytes(b"".join(lines[:6]) + lines[6][:30])
+    assert main(words) == 0
+    said = capsys.readouterr()
+    assert (json.loads(said.out)["ways"], said.err) == (whole["ways"], "")
+    assert log.read_bytes() == kept
+    stated = json.loads(lines[1])
+    stated["step"]["change"] = 0.5
+    log.write_bytes(b"".join([lines[0], json.dumps(stated).encode() + b"\n", *lines[2:]]))
+    assert main(words) == 0
+    assert json.loads(capsys.readouterr().out)["ways"][0]["step_changes"][0] == 0.5, "what is there is not measured"
+    assert main([*words, "--seconds", "0.16", "--size", "97x54"]) == 0
+    said = capsys.readouterr()
+    assert said.err == "gazetrace: found held a walk of another request (size, screen, gazes): starting over\n"
+    assert len(log.read_bytes().splitlines()) == 1 + 3 * 3
 
 
 @pytest.mark.parametrize(

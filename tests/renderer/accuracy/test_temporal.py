@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from renderer.accuracy.temporal import ALIGNED, SCANLINE, STEADY, WAYS, Flicker, flicker
+from renderer.accuracy.temporal import ALIGNED, SCANLINE, STEADY, WAYS, Flicker, flicker, flicker_steps
 from renderer.acuity import Acuity
 from renderer.display import Display
 from renderer.frame import FrameRequest
@@ -40,7 +40,8 @@ def spheres() -> PreparedScene:
 def measured(
     renderer: Renderer, scene: PreparedScene, walk: Sequence[Gaze], way: str, quality: Quality = QUALITY
 ) -> Flicker:
-    return flicker(renderer, scene, FrameRequest(walk[0], SCREEN, None, quality), walk, way)
+    view = FrameRequest(walk[0], SCREEN, None, quality)
+    return flicker(way, list(flicker_steps(renderer, scene, view, walk, way)))
 
 
 @pytest.mark.parametrize("way", WAYS)
@@ -105,12 +106,21 @@ def test_the_change_is_that_of_two_frames(renderer: Renderer, spheres: PreparedS
 
 
 def test_a_walk_needs_a_step(renderer: Renderer, spheres: PreparedScene) -> None:
-    with pytest.raises(ValueError, match="expected two gazes or more, found 1"):
+    with pytest.raises(ValueError, match="expected one or more, found none: a walk has two gazes or more"):
         measured(renderer, spheres, [Gaze(0.0, 0.0)], ALIGNED)
 
 
-def test_each_gaze_is_told(renderer: Renderer, spheres: PreparedScene) -> None:
-    told: list[None] = []
-    view = FrameRequest(Gaze(0.0, 0.0), SCREEN, None, QUALITY)
-    flicker(renderer, spheres, view, drift(4), SCANLINE, lambda: told.append(None))
-    assert len(told) == 4
+@pytest.mark.parametrize("way", WAYS)
+def test_a_walk_may_begin_at_any_step(renderer: Renderer, spheres: PreparedScene, way: str) -> None:
+    """A gaze that goes back and forth over the edge of a bucket: with hysteresis, what is shown depends on where it
+    came from.
+    """
+    edge = bucket_of(Gaze(92.0, 60.0), 8).x + 4.0
+    walk = [*drift(4), *(Gaze(edge + offset, 60.0) for offset in (1.0, -1.0, 1.5, -3.0))]
+    view = FrameRequest(walk[0], SCREEN, None, QUALITY)
+    steps = list(flicker_steps(renderer, spheres, view, walk, way))
+    assert len(steps) == 7
+    for begin in (1, 5, 6):
+        renderer.forget_samples()
+        assert list(flicker_steps(renderer, spheres, view, walk, way, begin)) == steps[begin:]
+    assert list(flicker_steps(renderer, spheres, view, walk, way, 7)) == []
