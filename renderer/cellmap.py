@@ -75,7 +75,7 @@ def build_cell_map(kind: str, display: Display, acuity: Acuity, bucket: GazeBuck
 def cell_sizes(display: Display, acuity: Acuity, bucket: GazeBucket) -> NDArray[np.uint16]:
     """rho of every pixel, (h, w) uint16 [px]: the largest cell side the eye allows there for any gaze of `bucket`."""
     sizes = np.zeros((display.height_px, display.width_px), dtype=np.uint16)
-    fill_cell_sizes(eye_geometry(display, acuity, bucket), 0, 0, sizes)
+    fill_cell_sizes(eye_geometry(display, acuity, bucket), 0, 0, False, sizes)
     return sizes
 
 
@@ -116,7 +116,7 @@ def _scanline_map(eye: EyeGeometry, bucket: GazeBucket, pool: Workers) -> CellMa
 
     def measure(strip: int) -> None:
         top = strip * FULL_STRIP_ROWS
-        fill_cell_sizes(eye, top, 0, sizes[top : top + FULL_STRIP_ROWS])
+        fill_cell_sizes(eye, top, 0, False, sizes[top : top + FULL_STRIP_ROWS])
 
     pool.run(measure, -(-eye.height_px // FULL_STRIP_ROWS))
     corners = np.zeros(shape, dtype=np.uint16)

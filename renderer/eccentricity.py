@@ -262,54 +262,70 @@ def _fill_eccentricities(eye: EyeGeometry, angles: NDArray[np.float64]) -> None:
 
 
 @formula
-def _even_cell_size(eye: EyeGeometry, x: float, y: float, reach: float) -> int:
-    """rho of every screen point at most `reach` [cm] from (x, y) if it is the same for all of them, else 0.
+def _cell_size_bounds(eye: EyeGeometry, x: float, y: float, reach: float) -> tuple[int, int]:
+    """What rho is at least and at most of all screen points that are at most `reach` [cm] from (x, y).
 
     A point that is `reach` away lies at most asin(reach / distance to the eye) off in angle; its pixel
     angle is bounded by the nearest and farthest distance from the foot and by how fast the pitch turns
-    with direction. Where these bounds grow loose the answer is 0: look at each pixel.
+    with direction, or near the foot by the pixel's sides. Where the block is large for the eye the answer is all there
+    is: look at each pixel.
     """
     off_x, off_y = x - eye.foot_x, y - eye.foot_y
     from_foot = math.sqrt(off_x * off_x + off_y * off_y)
     from_eye = math.sqrt(from_foot * from_foot + eye.distance * eye.distance)
-    stretch = max(eye.pitch_x, eye.pitch_y) / min(eye.pitch_x, eye.pitch_y)
-    if eye.half_x + eye.sway > 0.0 or reach > LOOSE * from_eye or stretch * reach > LOOSE * from_foot:
-        return 0
-    u, v = off_x / eye.pitch_x, off_y / eye.pitch_y
-    uu, vv = u * u, v * v
-    pitch = math.sqrt((uu + vv) / (uu / (eye.pitch_x * eye.pitch_x) + vv / (eye.pitch_y * eye.pitch_y)))
-    turn = ARCSINE_SLACK * stretch * reach / from_foot
-    wobble = 0.5 * (stretch - 1.0 / stretch) * turn
-    if wobble > LOOSE:
-        return 0
-    near, far = from_foot - reach, from_foot + reach
-    wide = _pixel_angle(pitch * (1.0 + wobble + wobble * wobble), near * near, eye.distance)
-    narrow = _pixel_angle(pitch * (1.0 - wobble), far * far, eye.distance)
+    if eye.half_x + eye.sway > 0.0 or reach > LOOSE * from_eye:
+        return 1, int(eye.max_side)
+    shortest, longest = min(eye.pitch_x, eye.pitch_y), max(eye.pitch_x, eye.pitch_y)
+    stretch = longest / shortest
+    if stretch * reach <= LOOSE * from_foot:
+        u, v = off_x / eye.pitch_x, off_y / eye.pitch_y
+        uu, vv = u * u, v * v
+        pitch = math.sqrt((uu + vv) / (uu / (eye.pitch_x * eye.pitch_x) + vv / (eye.pitch_y * eye.pitch_y)))
+        turn = ARCSINE_SLACK * stretch * reach / from_foot
+        wobble = 0.5 * (stretch - 1.0 / stretch) * turn
+        if wobble <= LOOSE:
+            longest = min(longest, pitch * (1.0 + wobble + wobble * wobble))
+            shortest = max(shortest, pitch * (1.0 - wobble))
+    near, far = max(0.0, from_foot - reach), from_foot + reach
+    wide = _pixel_angle(longest, near * near, eye.distance)
+    narrow = _pixel_angle(shortest, far * far, eye.distance)
     swing = ARCSINE_SLACK * DEG_PER_RAD * reach / from_eye
     angle = _eccentricity(eye, x, y) - eye.relief_deg
     low = _unit_angle(eye.floor_deg, eye.slope, eye.table, max(0.0, angle - swing)) / wide
     high = _unit_angle(eye.floor_deg, eye.slope, eye.table, max(0.0, angle + swing)) / narrow
-    low, high = max(1.0, min(eye.max_side, low)), max(1.0, min(eye.max_side, high))
-    return int(low) if int(low) == int(high) else 0
+    return int(max(1.0, min(eye.max_side, low))), int(max(1.0, min(eye.max_side, high)))
 
 
 @formula
-def even_tile_size(eye: EyeGeometry, top: int, left: int, side_px: int) -> int:
-    """rho of every pixel of the square tile at (left, top) if it is the same for all of them, else, perhaps, 0 [px]."""
+def block_size_bounds(eye: EyeGeometry, top: int, left: int, side_px: int) -> tuple[int, int]:
+    """What rho is at least and at most, perhaps loosely, over the pixels of the square block at (left, top) [px]."""
     y = (top + 0.5 * side_px - eye.height_px / 2) * eye.pitch_y
     x = (left + 0.5 * side_px - eye.width_px / 2) * eye.pitch_x
     diagonal = math.sqrt(eye.pitch_x * eye.pitch_x + eye.pitch_y * eye.pitch_y)
-    return _even_cell_size(eye, x, y, 0.5 * side_px * diagonal)
+    return _cell_size_bounds(eye, x, y, 0.5 * side_px * diagonal)
+
+
+@formula
+def aligned_side(size: int) -> int:
+    """Largest aligned side, of 1, 2, 3, 4, 6, 8, ..., up to `size`, which is 1 or more [px]."""
+    side = 1
+    while 2 * side <= size:
+        side *= 2
+    return 3 * (side // 2) if side >= 2 and 3 * (side // 2) <= size else side
 
 
 @roomy_kernel
-def fill_cell_sizes(eye: EyeGeometry, first_row: int, first_column: int, sizes: NDArray[np.uint16]) -> None:
+def fill_cell_sizes(
+    eye: EyeGeometry, first_row: int, first_column: int, aligned: bool, sizes: NDArray[np.uint16]
+) -> None:
     """Write rho of the pixels from (first_column, first_row) on into `sizes`, (rows, columns) uint16 [px].
 
-    Blocks over which rho provably does not change are filled at once; others are quartered, down to pixels.
+    Blocks over which rho provably does not change are filled at once; others are quartered, down to pixels. With
+    `aligned`, what is written may be less than rho, but allows the same aligned squares, and far more blocks are filled
+    at once.
     """
     pending = np.zeros((4 * LARGEST_BLOCK_PX, 3), dtype=np.int64)
-    _fill_blocks(eye, first_row, first_column, pending, sizes)
+    _fill_blocks(eye, first_row, first_column, aligned, pending, sizes)
 
 
 @kernel
@@ -317,12 +333,12 @@ def _fill_blocks(
     eye: EyeGeometry,
     first_row: int,
     first_column: int,
+    aligned: bool,
     pending: NDArray[np.int64],
     sizes: NDArray[np.uint16],
 ) -> None:
     """The same, with room in `pending` for the blocks that are yet to be looked at."""
     rows, columns = sizes.shape
-    diagonal = math.sqrt(eye.pitch_x * eye.pitch_x + eye.pitch_y * eye.pitch_y)
     for block_top in range(0, rows, LARGEST_BLOCK_PX):
         for block_left in range(0, columns, LARGEST_BLOCK_PX):
             pending[0, 0], pending[0, 1], pending[0, 2] = block_top, block_left, LARGEST_BLOCK_PX
@@ -331,13 +347,11 @@ def _fill_blocks(
                 count -= 1
                 top, left, side = pending[count, 0], pending[count, 1], pending[count, 2]
                 bottom, right = min(rows, top + side), min(columns, left + side)
-                y = (first_row + top + 0.5 * side - eye.height_px / 2) * eye.pitch_y
-                x = (first_column + left + 0.5 * side - eye.width_px / 2) * eye.pitch_x
-                even = _even_cell_size(eye, x, y, 0.5 * side * diagonal)
-                if even > 0:
+                low, high = block_size_bounds(eye, first_row + top, first_column + left, side)
+                if low == high or (aligned and aligned_side(low) == aligned_side(high)):
                     for row in range(top, bottom):
                         for column in range(left, right):
-                            sizes[row, column] = even
+                            sizes[row, column] = low
                 elif side > SMALLEST_BLOCK_PX:
                     half = side // 2
                     for part in range(4):

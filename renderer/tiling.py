@@ -10,8 +10,8 @@ rho, which takes the uncovered pixels in it.
 
 A *corner* array says where cells begin: the side of the cell at its top-left pixel, 0 elsewhere.
 
-The screen is tiled tile by tile, each a square of the screen that no aligned square crosses. Where rho is the same
-all over a tile, which holds for most, it is a plain grid of squares, and no pixel of it is looked at.
+The screen is tiled tile by tile, each a square of the screen that no aligned square crosses. Where rho allows the same
+squares all over a tile, or a part of it that none crosses, that is a plain grid, and no pixel of it is looked at.
 """
 
 from __future__ import annotations
@@ -19,20 +19,26 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.eccentricity import EyeGeometry, even_tile_size, fill_cell_sizes
+from renderer.eccentricity import EyeGeometry, aligned_side, block_size_bounds, fill_cell_sizes
 from renderer.kernel import formula, kernel, roomy_kernel
 
 LEAST_TILE_PX = 24
-"""Least side of a tile [px]: three quarters of such tiles of a desktop screen are plain grids."""
+"""Least side of a tile or a part of one [px]: nine tenths of such tiles of a desktop screen are plain grids."""
 
 
 def tile_side(largest_side: int) -> int:
     """Side of the tiles that can be tiled one by one [px]: a multiple of all aligned sides up to `largest_side`."""
+    period = period_of(largest_side)
+    return int(period * max(1, -(-LEAST_TILE_PX // period)))
+
+
+@formula
+def period_of(largest_side: int) -> int:
+    """Least common multiple of all aligned sides up to `largest_side` (for one or two, a multiple of it) [px]."""
     period = 1
     while period * 2 <= largest_side:
         period *= 2
-    period *= 3
-    return period * max(1, -(-LEAST_TILE_PX // period))
+    return 3 * period
 
 
 @roomy_kernel
@@ -52,25 +58,56 @@ def tile_strip(eye: EyeGeometry, tile_px: int, top: int, corners: NDArray[np.uin
     for tile in range(len(sides)):
         left = tile * tile_px
         columns = min(tile_px, eye.width_px - left)
-        even = even_tile_size(eye, top, left, tile_px) if rows == tile_px and columns == tile_px else 0
-        if even > 0:
-            sides[tile] = _aligned_side(even)
+        whole = rows == tile_px and columns == tile_px
+        low, high = block_size_bounds(eye, top, left, tile_px)
+        if whole and aligned_side(low) == aligned_side(high):
+            sides[tile] = aligned_side(low)
             across = tile_px // sides[tile]
             count += across * across
         else:
-            sizes = np.zeros((rows, columns), dtype=np.uint16)
-            fill_cell_sizes(eye, top, left, sizes)
-            count += mark_aligned(sizes, corners[tile])
+            count += _tile_in_parts(eye, tile_px, top, left, corners[tile, :rows, :columns])
     return count
 
 
-@formula
-def _aligned_side(size: int) -> int:
-    """Largest aligned side, of 1, 2, 3, 4, 6, 8, ..., up to `size`."""
-    side = 1
-    while 2 * side <= size:
-        side *= 2
-    return 3 * (side // 2) if side >= 2 and 3 * (side // 2) <= size else side
+@roomy_kernel
+def _tile_in_parts(eye: EyeGeometry, tile_px: int, top: int, left: int, corners: NDArray[np.uint16]) -> int:
+    """Tile one tile that is no plain grid and return how many cells it has.
+
+    It is quartered as long as no square of it is so large that it might cross a quarter's edge.
+
+    Args:
+        eye, tile_px: of `tile_strip`.
+        top, left: first row and column of the tile on the screen.
+        corners: (rows, columns) uint16, all 0 on entry.
+    """
+    rows, columns = corners.shape
+    pending = np.zeros((tile_px, 3), dtype=np.int64)
+    pending[0, 2] = tile_px
+    waiting, count = 1, 0
+    while waiting > 0:
+        waiting -= 1
+        first_row, first_column, side_px = pending[waiting, 0], pending[waiting, 1], pending[waiting, 2]
+        last_row, last_column = min(rows, first_row + side_px), min(columns, first_column + side_px)
+        whole = last_row - first_row == side_px and last_column - first_column == side_px
+        low, high = block_size_bounds(eye, top + first_row, left + first_column, side_px)
+        half = side_px // 2
+        if whole and aligned_side(low) == aligned_side(high):
+            length = aligned_side(low)
+            for row in range(first_row, last_row, length):
+                for column in range(first_column, last_column, length):
+                    corners[row, column] = length
+            count += (side_px // length) * (side_px // length)
+        elif side_px % 2 == 0 and half >= LEAST_TILE_PX and half % period_of(high) == 0:
+            for part in range(4):
+                part_row, part_column = first_row + half * (part // 2), first_column + half * (part % 2)
+                if part_row < last_row and part_column < last_column:
+                    pending[waiting, 0], pending[waiting, 1], pending[waiting, 2] = part_row, part_column, half
+                    waiting += 1
+        else:
+            sizes = np.zeros((last_row - first_row, last_column - first_column), dtype=np.uint16)
+            fill_cell_sizes(eye, top + first_row, left + first_column, True, sizes)
+            count += mark_aligned(sizes, corners[first_row:last_row, first_column:last_column])
+    return count
 
 
 @roomy_kernel
@@ -79,7 +116,7 @@ def mark_aligned(sizes: NDArray[np.uint16], corners: NDArray[np.uint16]) -> int:
 
     Args:
         sizes: (rows, columns) uint16 rho of its pixels [px].
-        corners: (rows or more, columns or more) uint16, all 0 on entry.
+        corners: (rows, columns) uint16, all 0 on entry.
     """
     rows, columns = sizes.shape
     largest = 1
