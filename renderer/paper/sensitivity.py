@@ -16,7 +16,10 @@ from renderer.acuity import contrast_threshold
 FOVEAL_GAIN: Final = 75.0
 FOVEAL_RISE: Final = 0.8
 FOVEAL_DECAY_DEG: Final = 0.2
-"""S(0, f) = 75 * f^0.8 * exp(-0.2 f), f in cpd (Movshon and Kiorpes 1988; constants as in Johnson and Fairchild 2002).
+"""S(0, f) = 75 * f^0.8 * exp(-0.2 f), f in cpd: the form a f^c exp(-b f) of Movshon and Kiorpes (1988) with the
+constants that Johnson and Fairchild (2003) are quoted with. Checked against public programs that use it, one of them
+supplementary to Preiss, Fernandes and Urban (2014), for the form, and two others for the constants; the two papers
+themselves could not be read.
 """
 
 FALL_OFF: Final = 0.040
@@ -31,7 +34,7 @@ FREQUENCIES: Final = 200
 
 
 def foveal_sensitivity(frequency_cpd: ArrayLike) -> NDArray[np.float64]:
-    """Contrast sensitivity at the fovea, 1 / C_t(0, f) (Movshon and Kiorpes 1988).
+    """Contrast sensitivity at the fovea, 1 / C_t(0, f), by the fit that stands at `FOVEAL_GAIN`.
 
     Args:
         frequency_cpd: spatial frequency f [cpd], any shape, 0 or more.
