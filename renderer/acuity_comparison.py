@@ -43,30 +43,31 @@ class ModelCost:
 
 
 def compare_models(display: Display, gaze: Gaze, quality: Quality, pool: Workers) -> tuple[ModelCost, ...]:
-    """Every acuity model on `display`, in the order of `MODELS`.
+    """Every acuity model on `display`, in the order of `MODELS`; arguments as of `model_cost`."""
+    return tuple(model_cost(name, display, gaze, quality, pool) for name in ACUITY_MODELS)
+
+
+def model_cost(name: str, display: Display, gaze: Gaze, quality: Quality, pool: Workers) -> ModelCost:
+    """One acuity model on `display`.
 
     Args:
+        name: of the model.
         display: the screen.
         gaze: where the eye looks [px].
         quality: tiling, bucket, samples a cell, and the eye but for its model.
-        pool: threads to build the maps on.
+        pool: threads to build the map on.
     """
-    angles = np.linspace(0.0, CURVE_END_DEG, CURVE_STEPS)
+    model, angles = ACUITY_MODELS[name], np.linspace(0.0, CURVE_END_DEG, CURVE_STEPS)
     bucket = bucket_of(gaze, quality.gaze_bucket_px)
-    costs = []
-    for name, model in ACUITY_MODELS.items():
-        cells = build_cell_map(quality.map, display, replace(quality.acuity, model=name), bucket, pool).cells
-        costs.append(
-            ModelCost(
-                model=name,
-                source=model.source,
-                formula=model.formula,
-                valid_deg=model.valid_deg,
-                eccentricities_deg=tuple(angles.tolist()),
-                cut_offs_cpd=tuple(cut_off_cpd(angles, name).tolist()),
-                cells=cells,
-                cells_per_pixel=cells / display.pixels,
-                camera_rays=cells * quality.samples_per_cell,
-            )
-        )
-    return tuple(costs)
+    cells = build_cell_map(quality.map, display, replace(quality.acuity, model=name), bucket, pool).cells
+    return ModelCost(
+        model=name,
+        source=model.source,
+        formula=model.formula,
+        valid_deg=model.valid_deg,
+        eccentricities_deg=tuple(angles.tolist()),
+        cut_offs_cpd=tuple(cut_off_cpd(angles, name).tolist()),
+        cells=cells,
+        cells_per_pixel=cells / display.pixels,
+        camera_rays=cells * quality.samples_per_cell,
+    )

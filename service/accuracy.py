@@ -34,7 +34,8 @@ async def accuracy(scene_id: str, _: Annotated[NoQuery, Query()], request: Reque
     """A dozen settings of the scene's own view, each timed on this machine and held against a reference.
 
     The first request begins the measurement, which goes on only while nobody waits for a frame, and is begun again
-    when the scene's files have changed. The table is `accuracy.json` of `gazetrace accuracy`, without pictures.
+    when the scene's files have changed. The table is `accuracy.json` of `gazetrace accuracy`, without pictures; it is
+    kept until the service ends.
     """
     desk.studio.require_ready()
     found = await desk.look_up(request, lambda: desk.surveyor.table(scene_id))

@@ -1,4 +1,7 @@
-"""What accuracy costs on this machine: a small table for each scene that is asked for, measured in idle time."""
+"""What accuracy costs on this machine: a small table for each scene that is asked for, measured in idle time.
+
+Tables are kept in memory, until the scene changes or the service ends.
+"""
 
 from __future__ import annotations
 
@@ -14,13 +17,15 @@ from renderer.accuracy.measurement import Measured, measure, setting_result
 from renderer.accuracy.record import DEFAULT, AccuracyReport, Reference
 from renderer.accuracy.reference import render_reference, rounds
 from renderer.accuracy.timing import timed_frame, turn
-from renderer.acuity import Acuity
+from renderer.acuity import MODELS, Acuity
+from renderer.acuity_comparison import ModelCost, model_cost
 from renderer.display import Display
 from renderer.frame import Abandoned, Frame, FrameRequest, StageTimes
 from renderer.gaze import Gaze
 from renderer.pipeline import Renderer
 from renderer.prepared import PreparedScene
 from renderer.quality import Quality
+from renderer.workers import WorkerPool
 from service.idle import Closed, Idle
 from service.openapi import package_version
 from service.rendering import Studio
@@ -80,7 +85,7 @@ class Survey:
     def steps(self) -> int:
         """Steps of a measurement."""
         reference = rounds(self.reference_samples, most_samples(self.settings))
-        return len(reference) + len(self.settings) * (1 + self.repeats)
+        return len(reference) + len(self.settings) * (1 + self.repeats) + len(MODELS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -196,6 +201,7 @@ class Surveyor:
                 measured[setting.id] = measure(patient, prepared, view, setting, reference.radiance)[0]
                 tick()
             times = self._times(patient, prepared, view, tick)
+            models = self._models(view, tick)
         finally:
             keeping.close(abandon=True)
             fresh.close(abandon=True)
@@ -215,7 +221,21 @@ class Surveyor:
             camera=scene.camera,
             reference=Reference(samples, reference.standard_error, round(reference.seconds, 3), ""),
             settings=tuple(sorted(results, key=lambda result: DEFAULT not in result.marks)),
+            acuity_models=models,
         )
+
+    def _models(self, view: FrameRequest, tick: Callable[[], None]) -> tuple[ModelCost, ...]:
+        """What each acuity model costs; each begins in idle time and takes as long as a cell map."""
+        pool = WorkerPool(self._threads)
+        costs = []
+        try:
+            for name in MODELS:
+                self._studio.idle.wait()
+                costs.append(model_cost(name, view.display, view.gaze, view.quality, pool))
+                tick()
+        finally:
+            pool.close()
+        return tuple(costs)
 
     def _times(
         self, patient: _Patient, prepared: PreparedScene, view: FrameRequest, tick: Callable[[], None]

@@ -12,10 +12,17 @@ import httpx
 import pytest
 
 from renderer.accuracy.record import AccuracyReport, read_record
+from renderer.acuity import MODELS
 from renderer.display import Display
+from renderer.frame import FrameRequest
+from renderer.gaze import Gaze
+from renderer.library import SceneLibrary
 from renderer.pipeline import Renderer
+from renderer.quality import Quality
+from service.metrics import Metrics
+from service.rendering import Studio
 from service.settings import Settings
-from service.survey import SETTINGS, Survey
+from service.survey import SETTINGS, Progress, Survey, Surveyor
 from tests.service.conftest import BROKEN_SCENE, PATIENCE_S, serving
 
 SURVEY = Survey(display=Display(320, 180, 16.7, None, 60.0), reference_samples=16, repeats=2)
@@ -79,6 +86,10 @@ def test_the_first_who_asks_begins_the_measurement_and_the_table_stays(measuring
     assert {result.id for result in report.settings} == {setting.id for setting in SETTINGS}
     assert report.settings[0].marks == ("default",)
     assert all(len(result.time_ms.repeats) == SURVEY.repeats for result in report.settings)
+    assert [model.model for model in report.acuity_models] == list(MODELS)
+    aligned = {result.id: result for result in report.settings}["aligned-4-100"]
+    peli = report.acuity_models[0]
+    assert (peli.cells, peli.camera_rays) == (aligned.cells, aligned.rays.primary)
     errors = {result.id: result.accuracy.rms for result in report.settings}
     assert errors["aligned-8-100"] < errors["aligned-1-100"]
     assert errors["full-4"] < errors["aligned-4-400"]
@@ -92,6 +103,34 @@ def test_frames_come_first_and_the_measurement_goes_on_after_them(measuring: htt
         assert told.status_code == 202
     assert told.json()["done"] < SURVEY.steps / 4
     assert table_of(measuring, "cornell")["scene"] == "cornell"
+
+
+def test_while_somebody_waits_for_a_frame_the_piece_in_hand_is_the_last(renderer: Renderer) -> None:
+    """Counted, not timed: a frame of a stream begins while the measurement is at work, and none of its pieces begins
+    until the last such frame is done.
+    """
+    studio = Studio(Settings(), renderer, SceneLibrary(), Metrics())
+    surveyor = Surveyor(studio, SURVEY, 1)
+    quality = Quality(samples_per_cell=1, gaze_bucket_px=0)
+
+    def done() -> int:
+        progress = surveyor.table("matte")
+        assert isinstance(progress, Progress)
+        return progress.done
+
+    pause, patience, earlier = threading.Event(), time.monotonic() + PATIENCE_S, 0
+    for stretch in range(3):
+        while done() <= earlier:
+            assert time.monotonic() < patience
+            pause.wait(0.01)
+        with studio.idle.busy():
+            earlier = done()
+            for step in range(5):
+                gaze = Gaze(10.0 * step, 5.0 * stretch)
+                studio.trace("matte", studio.library.load("matte"), FrameRequest(gaze, Display(64, 36), None, quality))
+            assert done() - earlier <= 1
+            earlier = done()
+    surveyor.close()
 
 
 def test_a_scene_that_changes_is_measured_again(measuring: httpx.Client, scenes: Path) -> None:
