@@ -51,13 +51,19 @@ def ladder(quality: Quality) -> Iterator[Acuity]:
             yield replace(quality.acuity, scale=scale)
 
 
-def fitted(request: FrameRequest, works: Iterable[Work], rates: Rates) -> FrameRequest:
-    """`request`, with cells so coarse that a frame of one sample of each should be done by its deadline, if any."""
-    quality = request.quality
-    if quality.deadline_ms is None or quality.map == "full":
-        return request
-    chosen = choose_acuity(works, request.display.pixels, rates, NS_PER_MS * quality.deadline_ms)
-    return replace(request, quality=replace(quality, acuity=chosen.acuity))
+def fitted(request: FrameRequest, works: Iterable[Work], rates: Rates) -> tuple[FrameRequest, bool | None]:
+    """`request`, with cells so coarse that a frame of one sample of each should be done by its deadline, if any.
+
+    Returns:
+        the request, and whether it should be done in time then; None for one without a deadline.
+    """
+    quality, pixels = request.quality, request.display.pixels
+    if quality.deadline_ms is None:
+        return request, None
+    left_ns = NS_PER_MS * quality.deadline_ms
+    chosen = choose_acuity(works, pixels, rates, left_ns)
+    promised = around_ns(chosen, pixels, rates) + tracing_ns(chosen, rates) <= left_ns
+    return replace(request, quality=replace(quality, acuity=chosen.acuity)), promised
 
 
 def affordable_samples(
@@ -92,6 +98,16 @@ def samples_lacking(held: NDArray[np.float64], wanted: int) -> float:
     return float((held[:wanted] * (wanted - np.arange(min(wanted, len(held))))).sum())
 
 
+def around_ns(work: Work, pixels: int, rates: Rates) -> float:
+    """Time to leave for all of a frame but tracing [ns]."""
+    return rates.margin * (rates.frame_pixel + (rates.map_pixel if work.new_map else 0.0)) * pixels
+
+
+def tracing_ns(work: Work, rates: Rates) -> float:
+    """Time to leave for tracing the first sample of each cell that has none [ns]."""
+    return rates.margin * rates.sample * samples_lacking(work.held, 1)
+
+
 def choose_acuity(works: Iterable[Work], pixels: int, rates: Rates, left_ns: float) -> Work:
     """The first of `works` whose frame with one sample a cell fits into `left_ns`, else the last.
 
@@ -107,8 +123,7 @@ def choose_acuity(works: Iterable[Work], pixels: int, rates: Rates, left_ns: flo
     chosen: Work | None = None
     for work in works:
         chosen = work
-        around = rates.margin * (rates.frame_pixel + (rates.map_pixel if work.new_map else 0.0)) * pixels
-        tracing = rates.margin * rates.sample * samples_lacking(work.held, 1)
+        around, tracing = around_ns(work, pixels, rates), tracing_ns(work, rates)
         if around + tracing <= left_ns or (around > left_ns and tracing <= LATE_SHARE * around):
             break
     assert chosen is not None

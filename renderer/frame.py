@@ -117,6 +117,7 @@ class FrameCost:
         mean_samples: camera samples that the frame shows, a cell on average.
         acuity_scale: factor on the cells' width that was used.
         deadline_ms: time that it was given [ms], None for as much as it takes.
+        deadline_promised: whether it was expected to be finished in time when it was planned; None without a deadline.
         deadline_met: whether it was finished in time; None without a deadline.
         max_error: what its stated error was to be at most, None for no bound.
         error_met: whether it is; None without a bound.
@@ -140,6 +141,7 @@ class FrameCost:
     mean_samples: float
     acuity_scale: float
     deadline_ms: float | None
+    deadline_promised: bool | None
     deadline_met: bool | None
     max_error: float | None
     error_met: bool | None

@@ -91,7 +91,9 @@ class Memory:
             if store is None:
                 store = SampleStore(0)
             number, settled = store.samples.number, store.spread.settled
-            if numbered is None:
+            if numbered is None and quality.map == "full":
+                yield Work(acuity, True, held_by_number(number, settled, np.arange(display.pixels), wanted))
+            elif numbered is None:
                 bucket = _bucket(quality, request.gaze)
                 yield Work(acuity, True, forecast_held(display, acuity, bucket, number, settled, wanted))
             else:

@@ -86,7 +86,7 @@ class Rates(NamedTuple):
 
     Attributes:
         map_pixel: a pixel of a screen whose map is new.
-        frame_pixel: a pixel, for all but its map and its samples.
+        frame_pixel: a pixel, for all but its map and its samples: choosing what fits, reconstruction.
         sample: a camera sample.
         margin: factor on all of them that few frames exceed.
     """

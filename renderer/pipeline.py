@@ -108,7 +108,8 @@ class Renderer:
         pool = self._pool.until(abandon)
         rates = self._pace.rates(prepared, request)
         most = request.quality.samples_per_cell if request.samples is None else request.samples
-        request = fitted(request, self._memory.works(prepared, request, most), rates)
+        request, promised = fitted(request, self._memory.works(prepared, request, most), rates)
+        planned = time.perf_counter_ns()
         quality = request.quality
         numbered, cached = self._memory.map(request.display, quality, request.gaze, pool)
         cells, slots = numbered.cells, numbered.slots
@@ -135,8 +136,9 @@ class Renderer:
             rebuild = reconstruct_smooth if quality.reconstruction == "smooth" else reconstruct
             pixels = rebuild(cells, slots, samples, prepared.scene.exposure, request.linear, pool)
         finished = time.perf_counter_ns()
-        frame_ns = finished - entered - growth.trace_ns
-        self._pace.learn(prepared, request, None if cached else mapped - began, frame_ns, growth.trace_ns, growth.asked)
+        frame_ns = planned - began + finished - entered - growth.trace_ns
+        map_ns = None if cached else mapped - planned
+        self._pace.learn(prepared, request, map_ns, frame_ns, growth.trace_ns, growth.asked)
         cost = FrameCost(
             map=quality.map,
             cells=cells.cells,
@@ -147,6 +149,7 @@ class Renderer:
             mean_samples=growth.held / cells.cells,
             acuity_scale=quality.acuity.scale,
             deadline_ms=quality.deadline_ms,
+            deadline_promised=promised,
             deadline_met=None if quality.deadline_ms is None else finished - began <= NS_PER_MS * quality.deadline_ms,
             max_error=quality.max_error,
             error_met=None if quality.max_error is None else error.within(quality.max_error),

@@ -45,7 +45,8 @@ async def render(body: RenderBody, _: Annotated[NoQuery, Query()], request: Requ
     over the screen, `foveal_rms` within 2.5 deg of the gaze. What is lost since cells are wider than pixels is not in
     it. It is a bound for regular samples and for lights with a size, and a guess in the share `guessed` of the
     screen, where cells hold one sample. `deadline_met` and `error_met` say whether the wishes `deadline_ms` and
-    `max_error` of the quality came true; if not, the frame is the best there was.
+    `max_error` of the quality came true; if not, the frame is the best there was. `deadline_promised` is false where
+    nothing was expected to fit the deadline from the outset.
     """
     received_ns = time.monotonic_ns()
     order = body.order()

@@ -42,7 +42,7 @@ PICTURE_REPLY: Replies = {
                 "square over the screen (`rms`) and within 2.5 deg of the gaze (`foveal_rms`); what is lost since "
                 "cells are wider than pixels is not in it. `guessed`: share of the screen whose cells hold one "
                 "sample, which are judged by their neighbours. `deadline_met`, `error_met`: whether what "
-                "was wished for came true",
+                "was wished for came true; `deadline_promised`: whether that was expected from the outset",
                 "schema": {"type": "string"},
             },
             "Server-Timing": {"description": "time of each stage [ms]", "schema": {"type": "string"}},

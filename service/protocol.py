@@ -330,7 +330,8 @@ class FrameHeader(Record):
         dropped: frames that this viewer missed.
         timing_ms: wait, map, trace, reconstruct, encode, total.
         cost: everything else, at the top level of the JSON: map, cells_traced, cells_reused, rays, effects, error
-            {rms, foveal_rms, guessed} (standard error as a share of white), deadline_met, error_met, ...
+            {rms, foveal_rms, guessed} (standard error as a share of white), deadline_promised,
+            deadline_met, error_met, ...
     """
 
     frame: Count

@@ -360,6 +360,7 @@ def spent(request: FrameRequest, cost: FrameCost) -> dict[str, object]:
         "samples": round(cost.mean_samples, 3),
         "acuity_scale": cost.acuity_scale,
         "deadline_ms": cost.deadline_ms,
+        "deadline_promised": cost.deadline_promised,
         "deadline_met": cost.deadline_met,
         "max_error": cost.max_error,
         "error_met": cost.error_met,

@@ -220,6 +220,7 @@ def cost_record(frame: Frame, request: FrameRequest, extra_ms: dict[str, float])
         "samples": round(cost.mean_samples, 3),
         "acuity_scale": cost.acuity_scale,
         "deadline_ms": cost.deadline_ms,
+        "deadline_promised": cost.deadline_promised,
         "deadline_met": cost.deadline_met,
         "max_error": cost.max_error,
         "error_met": cost.error_met,
@@ -260,7 +261,7 @@ def cost_text(record: dict[str, Any]) -> str:
         ("time", ", ".join(f"{ms:,.1f} ms {stage}" for stage, ms in record["timing_ms"].items())),
     ]  # fmt: skip
     if record["deadline_ms"] is not None:
-        met = "met" if record["deadline_met"] else "missed"
+        met = "met" if record["deadline_met"] else "missed" if record["deadline_promised"] else "missed, as foreseen,"
         lines.append(("deadline", f" of {record['deadline_ms']:g} ms {met} with {record['samples_per_cell']} samples "
                                   f"a cell and an acuity scale of {record['acuity_scale']:g}"))  # fmt: skip
     if record["max_error"] is not None:

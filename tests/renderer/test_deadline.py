@@ -143,6 +143,7 @@ def test_an_impossible_deadline_gives_the_coarsest_and_a_huge_one_the_full_frame
     coarsest = made.render(scene, asked(tiling, 1e-6))
     assert (coarsest.cost.acuity_scale, coarsest.cost.samples_per_cell) == (scale, 1)
     assert (coarsest.cost.deadline_met, coarsest.cost.mean_samples) == (False, 1)
+    assert coarsest.cost.deadline_promised is False
     coarse_quality = dataclasses.replace(asked(tiling, None).quality, acuity=Acuity(scale=scale))
     same = dataclasses.replace(asked(tiling, None, samples=1), quality=coarse_quality)
     np.testing.assert_array_equal(coarsest.pixels, fresh.render(scene, same).pixels)
@@ -150,6 +151,8 @@ def test_an_impossible_deadline_gives_the_coarsest_and_a_huge_one_the_full_frame
     full = made.render(scene, asked(tiling, 600_000))
     assert (full.cost.acuity_scale, full.cost.samples_per_cell) == (8.0, 3)
     assert (full.cost.deadline_met, full.cost.mean_samples) == (True, 3)
+    assert full.cost.deadline_promised is True
+    assert made.render(scene, asked(tiling, None)).cost.deadline_promised is None
     np.testing.assert_array_equal(full.pixels, fresh.render(scene, asked(tiling, None)).pixels)
     assert full.cost.guessed_error == 0
 
@@ -185,8 +188,10 @@ def test_samples_that_are_there_make_finer_frames_fit(scene: PreparedScene) -> N
     patient = Rates(1.0, 0.0, 1e9)
     made._pace.rates = lambda *_: patient  # type: ignore[method-assign]
     again = made.render(scene, asked("aligned", 1000))
+    assert again.cost.deadline_promised is True, "nothing is left to trace"
     assert (again.cost.acuity_scale, again.cost.samples_per_cell, again.cost.samples_traced) == (8.0, 3, 0)
     np.testing.assert_array_equal(again.pixels, full.pixels)
     moved = made.render(scene, asked("aligned", 1000, 50.0))
+    assert moved.cost.deadline_promised is False
     assert (moved.cost.acuity_scale, moved.cost.samples_per_cell) == (64.0, 1)
     made.close()

@@ -78,7 +78,7 @@ def test_the_header_says_what_is_shown_and_what_it_cost(client: httpx.Client) ->
     assert reply.headers["gazetrace-frame"].isascii()
     assert list(header) == [
         "frame", "scene", "width", "height", "format", "gaze", "map", "samples_per_cell", "samples", "acuity_scale",
-        "deadline_ms", "deadline_met", "max_error", "error_met",
+        "deadline_ms", "deadline_promised", "deadline_met", "max_error", "error_met",
         "cells_traced", "cells_reused", "rays", "effects", "effect_reasons", "error",
         "rejected_samples",
         "timing_ms", "service_time_ns",
