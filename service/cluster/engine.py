@@ -10,6 +10,7 @@ import json
 import logging
 import os
 import queue
+import secrets
 import socket
 import sys
 import threading
@@ -50,6 +51,9 @@ FIRST_PAUSE_S, LONGEST_PAUSE_S = 1.0, 60.0
 """Before a worker that could not be started is started again on the same node [s]: twice as long each time."""
 
 NAMESPACE: Final = "gazetrace"
+
+TOKEN_BYTES: Final = 32
+"""Of the secret that a cluster on this machine asks of whoever connects; nobody else is told."""
 
 
 @dataclass
@@ -218,6 +222,8 @@ def main(descriptor: int, options: dict[str, Any]) -> None:
     if where and not _reachable((where, int(at))):
         channel.send((DOWN, f"the head of the cluster at {options[ADDRESS]} cannot be reached"))
         return
+    if options[ADDRESS] == LOCAL:  # it listens on every address of this machine
+        os.environ |= {"RAY_AUTH_MODE": "token", "RAY_AUTH_TOKEN": secrets.token_hex(TOKEN_BYTES)}
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
     os.environ.setdefault("RAY_raylet_start_wait_time_s", "120")
     import ray
@@ -230,7 +236,6 @@ def main(descriptor: int, options: dict[str, Any]) -> None:
                 num_cpus=options[THREADS],
                 include_dashboard=False,
                 object_store_memory=options[OBJECT_STORE_BYTES],
-                _node_ip_address="127.0.0.1",
                 **quiet,
             )
         else:
