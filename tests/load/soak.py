@@ -1,7 +1,7 @@
 """One stream for long, of a gaze that is played over and over.
 
-What the service holds is looked at every few seconds; after a quarter of the time, when caches are full, a line is
-fitted to its memory over the frames that it has rendered.
+What the service holds is looked at every few seconds; after a quarter of the time a line is fitted to its memory,
+beside what it says that it keeps, over the frames that it has rendered.
 """
 
 from __future__ import annotations
@@ -12,9 +12,13 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+import httpx
+
 from clients.display import Display
 from clients.gaze_trace import GazeTrace
 from tests.load.growth import BLOCKS, Growth, growth_of
+from tests.load.kept import kept_bytes
+from tests.service.conftest import PATIENCE_S
 from tests.service.process import ServiceProcess
 
 RATE_HZ = 60.0
@@ -40,12 +44,14 @@ class Held:
         seconds: since the stream began.
         frames: rendered by then.
         memory_bytes: resident.
+        kept_bytes: of that, what the service says that it keeps.
         descriptors, threads: of the process.
     """
 
     seconds: float
     frames: int
     memory_bytes: int
+    kept_bytes: int
     descriptors: int
     threads: int
 
@@ -71,8 +77,9 @@ class Soak:
 
     @property
     def growth(self) -> Growth:
-        """Of the memory after the warm-up."""
-        return growth_of([each.frames for each in self.settled], [each.memory_bytes for each in self.settled])
+        """Of the memory beside what is kept, after the warm-up."""
+        besides = [each.memory_bytes - each.kept_bytes for each in self.settled]
+        return growth_of([each.frames for each in self.settled], besides)
 
     def verdict(self) -> str:
         """The figures; raises AssertionError unless the stream held and nothing grew."""
@@ -116,7 +123,8 @@ async def soak(
     """
     found, rendered = Soak(), 0
     every_s = min(seconds / (4 * BLOCKS), LOOK_S)
-    async with Display(service.address) as display:
+    asking = httpx.AsyncClient(base_url=service.address, timeout=PATIENCE_S, trust_env=False)
+    async with asking as client, Display(service.address) as display:
         await display.configure(
             scene,
             display={"width_px": size_px[0], "height_px": size_px[1]},
@@ -133,7 +141,7 @@ async def soak(
                 now = time.monotonic() - began
                 if now >= looked + every_s:
                     looked = now
-                    found.series.append(_held(service, now, rendered))
+                    found.series.append(_held(service, now, rendered, await kept_bytes(client)))
                 if now >= told + TELL_S:
                     told = now
                     tell(_line(found.series[-1]))
@@ -156,12 +164,13 @@ async def _look(display: Display, trace: GazeTrace) -> None:
                 display.look_away()
 
 
-def _held(service: ServiceProcess, seconds: float, frames: int) -> Held:
-    return Held(seconds, frames, service.resident_bytes, service.descriptors, service.threads)
+def _held(service: ServiceProcess, seconds: float, frames: int, kept: int) -> Held:
+    return Held(seconds, frames, service.resident_bytes, kept, service.descriptors, service.threads)
 
 
 def _line(held: Held) -> str:
     return (
-        f"{held.seconds / 60:6.1f} min  {held.frames:8,} frames  {held.memory_bytes / (1 << 20):7.1f} MiB  "
+        f"{held.seconds / 60:6.1f} min  {held.frames:8,} frames  {held.memory_bytes / (1 << 20):7.1f} MiB, "
+        f"{held.kept_bytes / (1 << 20):.1f} kept  "
         f"{held.descriptors} files  {held.threads} threads"
     )

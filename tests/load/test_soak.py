@@ -26,14 +26,15 @@ def test_a_stream_is_held_and_looked_at() -> None:
     assert found.rejected == 0
     assert len(found.settled) >= BLOCKS
     assert found.series[-1].frames > found.series[0].frames > 0
-    assert all(each.memory_bytes and each.descriptors and each.threads for each in found.series)
+    assert all(each.memory_bytes > each.kept_bytes > 0 for each in found.series)
+    assert all(each.descriptors and each.threads for each in found.series)
     assert not told, "a line a minute"
 
 
 @pytest.fixture
 def flat() -> Soak:
     noise = np.random.default_rng(1).normal(0.0, MIB, 400)
-    series = [Held(2.0 * i, 20 * i, 900 * MIB + int(noise[i]), 8, 10) for i in range(400)]
+    series = [Held(2.0 * i, 20 * i, 900 * MIB + int(noise[i]), 300 * MIB, 8, 10) for i in range(400)]
     return Soak(series, connections=1)
 
 
@@ -60,6 +61,12 @@ def test_nor_does_a_stream_that_broke_or_a_sample_that_is_no_light(flat: Soak, c
         Soak(flat.series, connections, rejected).verdict()
 
 
-def test_growth_while_caches_fill_does_not_count(flat: Soak) -> None:
+def test_what_is_kept_does_not_count(flat: Soak) -> None:
+    more = [(held, 2000 * held.frames) for held in flat.series]
+    series = [replace(held, memory_bytes=held.memory_bytes + n, kept_bytes=held.kept_bytes + n) for held, n in more]
+    assert "flat: " in Soak(series, connections=1).verdict()
+
+
+def test_growth_at_first_does_not_count(flat: Soak) -> None:
     series = [replace(held, memory_bytes=held.memory_bytes + MIB * min(i, 90)) for i, held in enumerate(flat.series)]
     assert "flat: " in Soak(series, connections=1).verdict()

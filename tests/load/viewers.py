@@ -16,6 +16,7 @@ from websockets.typing import Subprotocol
 
 from service import protocol
 from tests.load.growth import Growth, growth_of
+from tests.load.kept import kept_bytes
 from tests.service.conftest import PATIENCE_S
 from tests.service.process import ServiceProcess
 
@@ -49,6 +50,7 @@ class Load:
         frames: taken in by all viewers, by session.
         request_ms: of each small request.
         memory_mib, descriptors, threads: of the service, over time.
+        kept_mib: of that memory, what the service says that it keeps.
         done: frames by then.
         lost: connections that ended, and requests that were not answered with a frame.
     """
@@ -57,6 +59,7 @@ class Load:
     frames: Counter[str] = field(default_factory=Counter)
     request_ms: list[float] = field(default_factory=list)
     memory_mib: list[float] = field(default_factory=list)
+    kept_mib: list[float] = field(default_factory=list)
     descriptors: list[int] = field(default_factory=list)
     threads: list[int] = field(default_factory=list)
     done: list[int] = field(default_factory=list)
@@ -73,8 +76,9 @@ class Load:
 
     @property
     def growth(self) -> Growth:
-        """Of the memory, for each frame taken in; of a run that lasts for minutes."""
-        return growth_of(self.done, [held * MIB for held in self.memory_mib])
+        """Of the memory beside what is kept, for each frame taken in; of a run that lasts for minutes."""
+        besides = [MIB * (held - kept) for held, kept in zip(self.memory_mib, self.kept_mib, strict=True)]
+        return growth_of(self.done, besides)
 
     @property
     def memory_growth_mib(self) -> float:
@@ -131,6 +135,7 @@ async def _view(
         compression=None,
         proxy=None,
         open_timeout=PATIENCE_S,
+        ping_interval=None,
     ) as connection:
         await connection.send(protocol.encode(protocol.Hello(session=session)))
         if leads:
@@ -178,10 +183,12 @@ async def _ask(service: ServiceProcess, found: Load, counting: asyncio.Event) ->
 
 
 async def _watch(service: ServiceProcess, found: Load, counting: asyncio.Event) -> None:
-    while True:
-        await counting.wait()
-        found.memory_mib.append(service.resident_bytes / MIB)
-        found.descriptors.append(service.descriptors)
-        found.threads.append(service.threads)
-        found.done.append(found.frames.total())
-        await asyncio.sleep(SAMPLE_S)
+    async with httpx.AsyncClient(base_url=service.address, timeout=PATIENCE_S, trust_env=False) as client:
+        while True:
+            await counting.wait()
+            found.kept_mib.append(await kept_bytes(client) / MIB)
+            found.memory_mib.append(service.resident_bytes / MIB)
+            found.descriptors.append(service.descriptors)
+            found.threads.append(service.threads)
+            found.done.append(found.frames.total())
+            await asyncio.sleep(SAMPLE_S)
