@@ -12,6 +12,7 @@ from tests.hostile.odd_names import ask_odd_names
 from tests.hostile.requests import Asked, ask
 from tests.hostile.state import FLAGS, Before, Watch
 from tests.hostile.stream import Attacked, attack
+from tests.load.growth import Growth
 from tests.service.process import ServiceProcess, service_process
 
 TELL_S = 30.0
@@ -28,13 +29,15 @@ def main() -> None:
     with service_process(*FLAGS) as service:
         before = Before(service)
         if arguments.what == "http":
-            _http(service, arguments.cases, arguments.seed, arguments.workers)
+            growth = _http(service, arguments.cases, arguments.seed, arguments.workers)
         else:
-            _stream(service, arguments.messages, arguments.seed)
+            growth = _stream(service, arguments.messages, arguments.seed)
         print("state   ", before.check())
+        print("memory  ", growth, "messages" if arguments.what == "stream" else "requests")
+        assert growth.flat
 
 
-def _http(service: ServiceProcess, cases: int, seed: int, workers: int) -> None:
+def _http(service: ServiceProcess, cases: int, seed: int, workers: int) -> Growth:
     asked = Asked()
     with (
         _telling(lambda: f"{asked.total:,} requests, {len(asked.wrong)} answered wrongly"),
@@ -46,11 +49,10 @@ def _http(service: ServiceProcess, cases: int, seed: int, workers: int) -> None:
     assert not asked.wrong, "\n\n".join(f"{wrong.operation}: {wrong.found}" for wrong in asked.wrong)
     odd = ask_odd_names(service.address)
     assert not odd, "\n".join(odd)
-    print("memory  ", watch.growth, "requests")
-    assert watch.growth.flat
+    return watch.growth
 
 
-def _stream(service: ServiceProcess, messages: int, seed: int) -> None:
+def _stream(service: ServiceProcess, messages: int, seed: int) -> Growth:
     attacked = Attacked()
     with (
         _telling(
@@ -61,8 +63,7 @@ def _stream(service: ServiceProcess, messages: int, seed: int) -> None:
         attack(service.address, messages, seed, attacked)
     print("connections ended, by close code:", dict(attacked.closes), flush=True)
     assert not attacked.mistakes, attacked.mistakes[:20]
-    print("memory  ", watch.growth, "messages")
-    assert watch.growth.flat
+    return watch.growth
 
 
 @contextmanager
