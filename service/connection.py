@@ -51,7 +51,7 @@ class Connection(H11Protocol):
     def pause_writing(self) -> None:
         """The client reads slowly: it has so long to go on."""
         super().pause_writing()
-        self._reply_timer = self.loop.call_later(self.settings.client_timeout_s, self._drop)
+        self._reply_timer = self.loop.call_later(self.settings.client_timeout_s, drop, self.transport)
 
     def resume_writing(self) -> None:
         """It goes on."""
@@ -80,12 +80,6 @@ class Connection(H11Protocol):
         detail = f"expected HTTP/1.1, its head at most {self.settings.max_header_bytes:,} bytes long, found: {msg}"
         self._refuse(HTTPStatus.BAD_REQUEST, "damaged-request", detail)
 
-    def _drop(self) -> None:
-        """End the connection and forget what the kernel has still to send: it would keep that for minutes."""
-        at_once = struct.pack("ii", 1, 0)
-        self.transport.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, at_once)
-        self.transport.abort()
-
     def _refuse(self, status: HTTPStatus, kind: str, detail: str, headers: Mapping[str, str] | None = None) -> None:
         """Say why, unless a reply has begun, and end the connection."""
         connection_refused(self.service, status, kind, detail)
@@ -102,6 +96,13 @@ class Connection(H11Protocol):
 def connection_of(settings: Settings, service: FastAPI) -> type[Connection]:
     """The class of a service's connections."""
     return type("Connection", (Connection,), {"settings": settings, "service": service})
+
+
+def drop(transport: asyncio.Transport) -> None:
+    """End a connection and forget what the kernel has still to send: it would keep that for minutes."""
+    at_once = struct.pack("ii", 1, 0)
+    transport.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, at_once)
+    transport.abort()
 
 
 def _cancel(timer: asyncio.TimerHandle | None) -> None:

@@ -10,10 +10,11 @@ import uvicorn
 from fastapi import FastAPI
 
 from service.app import create_app
-from service.connection import connection_of
+from service.connection import connection_of, drop
 from service.settings import Settings
+from service.stream_connection import StreamConnection
 
-GOODBYE_S = 5
+GOODBYE_S = 4
 """How long requests in work may take to end when the service is told to stop [s]."""
 
 
@@ -40,11 +41,13 @@ class Server(uvicorn.Server):
         app.state.connections = self.server_state.connections
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-        """Say goodbye, then stop."""
+        """Say goodbye, then stop; who has not taken in by then what was sent is not waited for."""
         for server in self.servers:
             server.close()
         await self._app.state.desk.sessions.stop()
         await super().shutdown(sockets)
+        for connection in list(self.server_state.connections):
+            drop(connection.transport)
 
 
 def server_config(app: FastAPI, settings: Settings) -> uvicorn.Config:
@@ -55,7 +58,7 @@ def server_config(app: FastAPI, settings: Settings) -> uvicorn.Config:
         access_log=False,
         http=connection_of(settings, app),
         h11_max_incomplete_event_size=settings.max_header_bytes,
-        ws="websockets-sansio",
+        ws=StreamConnection,
         ws_max_size=settings.max_message_bytes,
         ws_ping_interval=settings.ping_s,
         ws_ping_timeout=settings.ping_s,

@@ -71,7 +71,8 @@ class Settings:
         max_viewers: viewers, and gaze sources, of one session.
         max_message_bytes: longest message of a stream that is read.
         max_messages_per_s: most messages a second of a client of a stream, over any second.
-        ping_s: how often a stream's client is asked whether it is there, and how long it may take to answer [s].
+        ping_s: how often a client of a stream is asked whether it is there, and how long it may take to answer once
+            it was sent nothing more, or take in nothing of what was [s].
         session_expiry_s: how long a session is kept for those who left it [s].
         frame_bytes: memory for frames in work, 128 bytes a pixel; beyond, they wait for each other.
         map_cache_bytes: memory for cell maps.
