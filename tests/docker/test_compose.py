@@ -10,11 +10,22 @@ import pytest
 import yaml
 
 from clients.command_line import build_parser
+from service.loader import AT_ONCE
+from service.settings import Settings
 from tests.clients.commands import ROOT
 
 DOCKER = ROOT / "docker"
 COMPOSE: dict[str, Any] = yaml.safe_load((DOCKER / "compose.yaml").read_text())
 SERVICES: dict[str, dict[str, Any]] = COMPOSE["services"]
+
+FRESH_BYTES = 400 << 20
+"""What a service takes before it is asked for anything."""
+
+
+def most_held(settings: Settings) -> int:
+    """Memory that a service with these settings may come to [bytes]."""
+    kept = settings.map_cache_bytes + settings.store_bytes + settings.scene_bytes
+    return FRESH_BYTES + kept + settings.frame_bytes + AT_ONCE * settings.max_load_bytes
 
 
 def test_the_service_runs_alone_unless_more_is_asked_for() -> None:
@@ -35,6 +46,14 @@ def test_no_container_may_do_more_than_it_has_to(name: str) -> None:
     assert service["pids_limit"]
     assert "privileged" not in service
     assert all(port.startswith("127.0.0.1:") for port in service.get("ports", ()))
+
+
+@pytest.mark.parametrize("name", ["gazetrace", "head"])
+def test_what_the_service_may_hold_fits_into_its_container(name: str) -> None:
+    service = SERVICES[name]
+    memory = {key: value for key, value in service["environment"].items() if key.endswith("_BYTES")}
+    granted = int(service["mem_limit"].removesuffix("g")) - int(service.get("shm_size", "0g").removesuffix("g"))
+    assert most_held(Settings.from_environment(memory)) <= granted << 30
 
 
 @pytest.mark.parametrize("name", SERVICES)

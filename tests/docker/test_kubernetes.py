@@ -14,6 +14,7 @@ import yaml
 from service.access import OPEN_PATHS
 from service.settings import VARIABLE_PREFIX, Settings
 from tests.clients.commands import ROOT
+from tests.docker.test_compose import most_held
 
 TEXT = (ROOT / "docker" / "kubernetes.yaml").read_text()
 DEPLOYMENT, SERVICE = yaml.safe_load_all(TEXT)
@@ -43,6 +44,13 @@ def test_the_pod_may_do_as_little_as_the_container() -> None:
         assert container["resources"]["limits"].keys() == {"cpu", "memory"}
         mounted = {mount["name"] for mount in container["volumeMounts"]}
         assert mounted <= {volume["name"] for volume in POD["volumes"]}
+
+
+def test_what_the_service_may_hold_fits_into_its_pod() -> None:
+    (container,) = POD["containers"]
+    memory = {each["name"]: each["value"] for each in container["env"] if each["name"].endswith("_BYTES")}
+    granted = int(container["resources"]["limits"]["memory"].removesuffix("Gi")) << 30
+    assert most_held(Settings.from_environment(memory)) <= granted
 
 
 def test_it_asks_and_sets_what_there_is() -> None:
