@@ -39,8 +39,9 @@ NEIGHBOURS_SHARE = 0.25
 these have nothing to do with each other (each differs from its mean by their common variance, from each other by
 twice that), and 0.14 where straight edges between flat areas pass through, of which the centres see all or nothing."""
 
-GUESSED_CELLS = 65_536
-"""How many cells of a map, about, make the guess: their mean is then off by a percent or so."""
+GUESSED_CELLS = 16_384
+"""How many cells of a map, about, make the guess: their mean is then off by some percent, in the fovea by a
+tenth at worst of what was tried, and the guess is no better anyway."""
 
 CHUNK_CELLS = 65_536
 """Cells summed together."""
