@@ -8,6 +8,7 @@ import re
 from collections import OrderedDict
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from threading import Lock
 from typing import Final
@@ -40,6 +41,8 @@ class SceneLibrary:
             Nothing outside it is opened.
         max_bytes: bound on all prepared scenes kept, by their `nbytes`; the last one used is always kept.
         read: reads the scene of a folder, which messages call by the name given; None: in this process.
+        watch: entered while a scene of this id and version is prepared, after it was read; may refuse it by a
+            `SceneError`.
 
     Raises:
         SceneError: for a folder that does not exist.
@@ -50,12 +53,14 @@ class SceneLibrary:
         folder: Path | None = None,
         max_bytes: int = DEFAULT_MAX_BYTES,
         read: Callable[[Path, str], Scene] | None = None,
+        watch: Callable[[str, str], AbstractContextManager[None]] = lambda *_: nullcontext(),
     ) -> None:
         if folder is not None and not folder.is_dir():
             raise SceneError(f"{folder}: expected a folder of scenes, found none")
         self._folder = None if folder is None else folder.resolve()
         self._max_bytes = max_bytes
         self._read = read or _read_here
+        self._watch = watch
         self._lock = Lock()
         self._ready: OrderedDict[str, tuple[str, PreparedScene]] = OrderedDict()
         self._broken: dict[str, tuple[str, str]] = {}
@@ -125,7 +130,9 @@ class SceneLibrary:
     def _load(self, scene_id: str, version: str, mine: Future[PreparedScene]) -> None:
         """Load a scene, for this thread and those that wait for `mine`."""
         try:
-            prepared = prepare(self._scene(scene_id))
+            scene = self._scene(scene_id)
+            with self._watch(scene_id, version):
+                prepared = prepare(scene)
         except BaseException as error:
             with self._lock:
                 del self._loading[scene_id, version]

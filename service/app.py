@@ -31,6 +31,7 @@ from service.sessions import Sessions
 from service.settings import Settings
 from service.stage import Stage
 from service.survey import Survey, Surveyor
+from service.watch import Watch
 
 if TYPE_CHECKING:
     from service.cluster.cluster import Cluster
@@ -48,7 +49,7 @@ def create_app(
     announce: Callable[[str], None] = log.info,
     clock: Callable[[], int] = time.monotonic_ns,
     survey: Survey | None = None,
-    crashes: int = 0,
+    watch: Watch | None = None,
 ) -> FastAPI:
     """The application.
 
@@ -58,7 +59,7 @@ def create_app(
         announce: receives a line when the kernels begin to compile and one when frames can be rendered.
         clock: of the sessions, monotonic [ns].
         survey: what is measured of a scene in idle time; None for the usual.
-        crashes: how often native code brought this service down before.
+        watch: over its scenes; None where nothing is known of them, nor kept.
     """
 
     @asynccontextmanager
@@ -66,9 +67,10 @@ def create_app(
         cluster = None if settings.cluster is None else _join(settings.cluster, settings.threads, announce)
         own = renderer or Renderer(settings.threads, settings.map_cache_bytes, settings.store_bytes, cluster)
         loader = Loader(settings)
-        library = SceneLibrary(settings.scenes, settings.scene_bytes, loader.read)
+        over = watch or Watch()
+        library = SceneLibrary(settings.scenes, settings.scene_bytes, loader.read, over.preparing)
         obstacle = (lambda: None) if cluster is None else (lambda: cluster.obstacle)
-        studio = Studio(settings, own, library, Metrics(crashes), obstacle)
+        studio = Studio(settings, own, library, Metrics(over.past.crashes), over, obstacle)
         desk = Desk(
             studio,
             Catalogue(library),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 
 from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, ProcessCollector, generate_latest
@@ -27,6 +27,7 @@ class Now:
         sessions, viewers, gaze_sources: of streams.
         running_frames, waiting_frames: of requests: in work, and waiting for their turn.
         held_bytes: kept between frames or granted to them, by kind.
+        quarantined: scenes that are refused since they bring the service down.
     """
 
     connections: int
@@ -36,6 +37,7 @@ class Now:
     running_frames: int
     waiting_frames: int
     held_bytes: Mapping[str, int]
+    quarantined: Sequence[str]
 
 
 class Metrics:
@@ -72,6 +74,9 @@ class Metrics:
         self._sources = self._gauge("gaze_sources", "Gaze sources connected.")
         self._queue = self._gauge("requested_frames", "Frames of requests, running or waiting for their turn.", "state")
         self._held = self._gauge("held_bytes", "Memory of what is kept, and granted to frames in work.", "kind")
+        self._quarantined = self._gauge(
+            "quarantined_scenes", "Scenes refused since they bring this service down: 1 for each.", "scene"
+        )
         ProcessCollector(registry=self._registry)
 
     def frame(self, cost: FrameCost, stages_ms: Mapping[str, float]) -> None:
@@ -127,6 +132,9 @@ class Metrics:
         self._queue.labels("waiting").set(now.waiting_frames)
         for kind, size in now.held_bytes.items():
             self._held.labels(kind).set(size)
+        self._quarantined.clear()
+        for scene_id in now.quarantined:
+            self._quarantined.labels(scene_id).set(1)
         return generate_latest(self._registry)
 
     def _counter(self, name: str, text: str, *labels: str) -> Counter:

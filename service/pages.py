@@ -108,6 +108,7 @@ def _now(request: Request, desk: Desk) -> Now:
         running_frames=desk.renders.running,
         waiting_frames=desk.renders.waiting,
         held_bytes=desk.studio.held_bytes(),
+        quarantined=desk.studio.watch.quarantined,
     )
 
 

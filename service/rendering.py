@@ -25,6 +25,7 @@ from service.idle import Idle
 from service.metrics import Metrics
 from service.room import Room
 from service.settings import Settings
+from service.watch import Watch
 
 NS_PER_MS = 1_000_000
 
@@ -111,11 +112,13 @@ class Studio:
         renderer: traces; belongs to the caller.
         library: scenes; belongs to the caller.
         metrics: counts frames.
+        watch: over the scenes at work.
         obstacle: why nothing can be traced now, None if it can; asked again and again.
 
     Attributes:
         idle: whoever has work for when nobody waits for a frame asks it.
         room: memory for frames in work.
+        watch: whoever traces a scene tells it.
     """
 
     def __init__(
@@ -124,10 +127,12 @@ class Studio:
         renderer: Renderer,
         library: SceneLibrary,
         metrics: Metrics,
+        watch: Watch,
         obstacle: Callable[[], str | None] = lambda: None,
     ) -> None:
         self.settings = settings
         self.metrics = metrics
+        self.watch = watch
         self.library = library
         self.idle = Idle()
         self.room = Room(settings.frame_bytes)
@@ -165,6 +170,7 @@ class Studio:
         """Say no more about kernels: the renderer is about to end, perhaps while it still compiles them."""
         self._closed = True
         self.room.close()
+        self.watch.close()
 
     def require_ready(self) -> None:
         """Return if frames can be rendered.
@@ -284,19 +290,21 @@ class Studio:
         """Render a frame without encoding it.
 
         Args:
-            scene_id: for the log.
+            scene_id: its id.
             prepared: the scene.
             request: already checked.
             abandon: set it, from another thread, to give up the frame.
 
         Raises:
             Abandoned: soon after `abandon` is set.
+            Stopping: if the service ends before it can begin.
             OverLimit: for more camera rays than one request may ask for.
         """
         with self.idle.busy(), self.room.take(request.display.pixels * BYTES_A_PIXEL, abandon):
             started_ns = time.monotonic_ns()
             known_map, map_ms = self._check_cells(request)
-            frame = self._renderer.render(prepared, request, abandon)
+            with self.watch.tracing(scene_id, abandon):
+                frame = self._renderer.render(prepared, request, abandon)
         cost = replace(frame.cost, map_cached=frame.cost.map_cached and known_map)
         if cost.rejected_samples.total:
             log.warning("%s: samples that are no light: %s", scene_id, asdict(cost.rejected_samples))

@@ -13,21 +13,22 @@ from service.app import create_app
 from service.connection import connection_of, drop
 from service.settings import Settings
 from service.stream_connection import StreamConnection
+from service.watch import Watch
 
 GOODBYE_S = 4
 """How long requests in work may take to end when the service is told to stop [s]."""
 
 
-def run(settings: Settings, listener: socket.socket, announce: Callable[[str], None], crashes: int = 0) -> None:
+def run(settings: Settings, listener: socket.socket, announce: Callable[[str], None], watch: Watch) -> None:
     """Serve until stopped (Ctrl-C or SIGTERM).
 
     Args:
         settings: limits and access.
         listener: where clients connect.
         announce: receives a line when the kernels begin to compile and one when frames can be rendered.
-        crashes: how often native code brought this service down before.
+        watch: over its scenes.
     """
-    server = Server(create_app(settings, announce=announce, crashes=crashes), settings)
+    server = Server(create_app(settings, announce=announce, watch=watch), settings)
     with contextlib.suppress(KeyboardInterrupt):
         server.run(sockets=[listener])
 

@@ -37,6 +37,7 @@ MOST_CONNECTIONS = 65_536
 MOST_MESSAGES_PER_S = 1_000_000
 LONGEST_CLIENT_TIMEOUT_S = 3600
 LONGEST_LOAD_S = 24 * 3600
+LEAST_SCENE_CRASHES, MOST_SCENE_CRASHES = 2, 1000
 LONGEST_EXPIRY_S = 7 * 24 * 3600
 
 
@@ -83,6 +84,7 @@ class Settings:
         max_texture_pixels: most pixels of a picture on its surfaces.
         max_load_s: how long reading such a scene may take [s].
         max_load_bytes: memory that reading such a scene may take.
+        max_scene_crashes: crashes of native code with a scene at work, after which it is refused; 2 or more.
         allowed_hosts: further names this service goes by, for a proxy in front of it; `*` for any.
         allowed_origins: origins, such as `https://lab.example`, whose pages may use it from a browser.
 
@@ -127,6 +129,7 @@ class Settings:
     max_texture_pixels: int = 1 << 26
     max_load_s: int = 120
     max_load_bytes: int = 4 << 30
+    max_scene_crashes: int = 2
     allowed_hosts: tuple[str, ...] = ()
     allowed_origins: tuple[str, ...] = ()
 
@@ -153,6 +156,7 @@ class Settings:
         require_integer("ping_s", self.ping_s, 1, LONGEST_CLIENT_TIMEOUT_S)
         require_integer("session_expiry_s", self.session_expiry_s, 0, LONGEST_EXPIRY_S)
         require_integer("max_load_s", self.max_load_s, 1, LONGEST_LOAD_S)
+        require_integer("max_scene_crashes", self.max_scene_crashes, LEAST_SCENE_CRASHES, MOST_SCENE_CRASHES)
         for name in ("map_cache_bytes", "store_bytes", "scene_bytes"):
             require_integer(name, getattr(self, name), 0, MOST_BYTES)
         for name in ("frame_bytes", "max_scene_file_bytes", "max_triangles", "max_texture_pixels", "max_load_bytes"):

@@ -5,6 +5,7 @@ The socket belongs to the process here, so that clients who connect meanwhile wa
 
 from __future__ import annotations
 
+import mmap
 import os
 import signal
 import socket
@@ -13,12 +14,14 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
 
+from service.crash_record import CrashRecord, Past
 from service.listener import address_of, listen
 from service.settings import Settings
+from service.work_notes import WorkNotes
 
 PACKAGES = Path(__file__).parents[1]
 
@@ -72,38 +75,48 @@ class _Supervisor:
 
     def run(self) -> signal.Signals | None:
         """Return when the service has ended: the signal that stopped it."""
-        crashes, ended_by, pause_s = 0, "-", FIRST_PAUSE_S
+        record, pause_s = CrashRecord(self._settings.max_scene_crashes), FIRST_PAUSE_S
         with self._hearing_signals():
             while not self._stop.is_set():
                 began = time.monotonic()
-                with self._start(crashes, ended_by) as process:
-                    self._process = process
-                    if self._stop.is_set():
-                        self._end(process)
-                    status = process.wait()
+                with _shared_memory(WorkNotes.size(record.past.told)) as (memory, descriptor):
+                    status = self._run(record.past, descriptor)
+                    notes = WorkNotes(memory, record.past.told)
+                    at_work, done = notes.at_work(), notes.done()
                 if self._stop.is_set():
                     break
                 if status >= 0:
                     raise SystemExit(status)
-                crashes += 1
                 pause_s = FIRST_PAUSE_S if time.monotonic() - began > STEADY_S else pause_s
-                ended_by = _signal_name(-status)
+                record.crashed(_signal_name(-status), at_work, done)
                 self._stop.wait(pause_s)
                 pause_s = min(2 * pause_s, LONGEST_PAUSE_S)
         return self._stopped_by
 
-    def _start(self, crashes: int, ended_by: str) -> subprocess.Popen[bytes]:
+    def _run(self, past: Past, notes: int) -> int:
+        """The status with which a process ended that was told of those before it."""
+        with self._start(notes) as process:
+            self._process = process
+            if self._stop.is_set():
+                self._end(process)
+            assert process.stdin is not None
+            with suppress(BrokenPipeError):
+                process.stdin.write(past.to_line())
+                process.stdin.flush()
+            return process.wait()
+
+    def _start(self, notes: int) -> subprocess.Popen[bytes]:
         """The process; it reads its standard input until that ends, and ends with it.
 
         In a process group of its own: Ctrl-C in a terminal then reaches it once, from here.
         """
-        words = [sys.executable, "-P", "-m", "service", str(self._listener.fileno()), str(crashes), ended_by]
+        words = [sys.executable, "-P", "-m", "service", str(self._listener.fileno()), str(notes)]
         path = os.pathsep.join(filter(None, (str(PACKAGES), os.environ.get("PYTHONPATH"))))
         return subprocess.Popen(
             [*words, *(["--debug"] if self._debug else [])],
             env={**os.environ, **self._settings.to_environment(), "PYTHONPATH": path},
             stdin=subprocess.PIPE,
-            pass_fds=[self._listener.fileno()],
+            pass_fds=[self._listener.fileno(), notes],
             process_group=0,
         )
 
@@ -129,6 +142,18 @@ class _Supervisor:
         finally:
             for number, handler in before.items():
                 signal.signal(number, handler)
+
+
+@contextmanager
+def _shared_memory(nbytes: int) -> Iterator[tuple[mmap.mmap, int]]:
+    """Memory of no file, all zero, and a descriptor by which a process started here shares it."""
+    descriptor = os.memfd_create("gazetrace-notes")
+    try:
+        os.ftruncate(descriptor, nbytes)
+        with mmap.mmap(descriptor, nbytes) as memory:
+            yield memory, descriptor
+    finally:
+        os.close(descriptor)
 
 
 def _signal_name(number: int) -> str:

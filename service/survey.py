@@ -26,7 +26,8 @@ from renderer.pipeline import Renderer
 from renderer.prepared import PreparedScene
 from renderer.quality import Quality
 from renderer.workers import WorkerPool
-from service.idle import Closed, Idle
+from service.idle import Closed
+from service.jobs import Stopping
 from service.openapi import package_version
 from service.rendering import Studio
 
@@ -155,7 +156,7 @@ class Surveyor:
             try:
                 version = self._studio.library.version(scene_id)
                 table = self._measured(scene_id, self._studio.library.load(scene_id))
-            except Closed:
+            except (Closed, Stopping):
                 return
             except Exception as error:
                 log.exception("what accuracy costs could not be measured for %s", scene_id)
@@ -180,7 +181,7 @@ class Surveyor:
 
     def _measured(self, scene_id: str, prepared: PreparedScene) -> AccuracyReport:
         """Everything of a scene, from the start: what a scene was that has changed since is of no use."""
-        survey, idle = self._survey, self._studio.idle
+        survey = self._survey
         display = survey.display
         view = FrameRequest(Gaze(display.width_px / 2, display.height_px / 2), display, None, Quality())
 
@@ -191,11 +192,11 @@ class Surveyor:
             self._wanted[scene_id] = 0
         keeping, fresh = Renderer(self._threads, 0, STORE_BYTES), Renderer(self._threads, 0, 0)
         try:
-            patient = _Patient(keeping, idle)
+            patient = _Patient(keeping, self._studio, scene_id)
             samples, spared = survey.reference_samples, most_samples(survey.settings)
             reference = render_reference(patient, prepared, view, samples, spared, tick)
             keeping.forget_samples()
-            patient = _Patient(fresh, idle)
+            patient = _Patient(fresh, self._studio, scene_id)
             measured: dict[str, Measured] = {}
             for setting in survey.settings:
                 measured[setting.id] = measure(patient, prepared, view, setting, reference.radiance)[0]
@@ -251,19 +252,21 @@ class Surveyor:
 class _Patient:
     """Renders in idle time: a frame that somebody else's interrupts is begun again when there is time."""
 
-    def __init__(self, renderer: Renderer, idle: Idle) -> None:
+    def __init__(self, renderer: Renderer, studio: Studio, scene_id: str) -> None:
         self._renderer = renderer
-        self._idle = idle
+        self._studio = studio
+        self._scene_id = scene_id
 
     def render(self, prepared: PreparedScene, request: FrameRequest) -> Frame:
         """Render one frame.
 
         Raises:
-            Closed: if there will be no more time.
+            Closed, Stopping: if there will be no more time.
         """
         while True:
-            interrupt = self._idle.wait()
+            interrupt = self._studio.idle.wait()
             try:
-                return self._renderer.render(prepared, request, interrupt)
+                with self._studio.watch.tracing(self._scene_id, interrupt):
+                    return self._renderer.render(prepared, request, interrupt)
             except Abandoned:
                 continue

@@ -37,6 +37,7 @@ FIRES = {
         'gazetrace_frames_total{via="stream"}': "0+100x80",
     },
     "GazetraceRefuses": {'gazetrace_refusals_total{via="http",kind="busy"}': "0+10x80"},
+    "GazetraceQuarantine": {'gazetrace_quarantined_scenes{scene="bad"}': "1x80"},
     "GazetraceBrokenSamples": {'gazetrace_rejected_samples_total{reason="not_a_number"}': "0x23 1x40"},
 }
 """Series, one value every 15 s, in which each alert should fire."""
@@ -52,7 +53,11 @@ CALM = {
 }
 """And some in which none should."""
 
-LABELS = {"GazetraceGone": {"job": "gazetrace"}, "GazetraceBrokenSamples": {"reason": "not_a_number"}}
+LABELS = {
+    "GazetraceGone": {"job": "gazetrace"},
+    "GazetraceQuarantine": {"scene": "bad"},
+    "GazetraceBrokenSamples": {"reason": "not_a_number"},
+}
 """Labels of the series that an alert is about."""
 
 
@@ -86,6 +91,8 @@ def counted() -> dict[str, dict[str, set[str]]]:
     renderer.close()
     found: dict[str, dict[str, set[str]]] = {"up": {}}
     for family in text_string_to_metric_families(text):
+        if family.type == "gauge":
+            found.setdefault(family.name, {})  # there may be nothing to count now
         for sample in family.samples:
             labels = found.setdefault(sample.name, {})
             for label, value in sample.labels.items():

@@ -23,6 +23,7 @@ from service.metrics import Metrics
 from service.rendering import Studio
 from service.settings import Settings
 from service.survey import SETTINGS, Progress, Survey, Surveyor
+from service.watch import Watch
 from tests.service.conftest import BROKEN_SCENE, PATIENCE_S, serving
 
 SURVEY = Survey(display=Display(320, 180, 16.7, None, 60.0), reference_samples=16, repeats=2)
@@ -109,7 +110,8 @@ def test_while_somebody_waits_for_a_frame_the_piece_in_hand_is_the_last(renderer
     """Counted, not timed: a frame of a stream begins while the measurement is at work, and none of its pieces begins
     until the last such frame is done.
     """
-    studio = Studio(Settings(), renderer, SceneLibrary(), Metrics())
+    watch = Watch()
+    studio = Studio(Settings(), renderer, SceneLibrary(watch=watch.preparing), Metrics(), watch)
     surveyor = Surveyor(studio, SURVEY, 1)
     quality = Quality(samples_per_cell=1, gaze_bucket_px=0)
 

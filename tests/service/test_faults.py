@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 import asyncio
+import mmap
 import os
 import resource
 import signal
 import socket
+import threading
 import time
 from collections.abc import Mapping
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import suppress
 from pathlib import Path
 
 import httpx
 
 from clients.display import Display
+from service import protocol
 from service.protocol import CloseCode
+from service.rendering import BYTES_A_PIXEL
+from service.work_notes import WorkNotes
 from tests.service.conftest import PATIENCE_S
 from tests.service.process import ServiceProcess, service_process
 from tests.service.streaming import configure, viewer
@@ -36,6 +42,12 @@ HUGE: dict[str, str | int] = {
     "map": "full",
     "samples_per_cell": 1,
 }
+
+LARGE: dict[str, str | int] = {**SMALL, "width_px": 2560, "height_px": 1440, "map": "full", "samples_per_cell": 32}
+"""So much that the service is ended long before it is done."""
+
+LARGE_BYTES = 2560 * 1440 * BYTES_A_PIXEL
+LENT = 'gazetrace_held_bytes{kind="frames"}'
 
 SPARE_BYTES = 256 << 20
 """Memory that a service is left: enough for a small frame, too little for an 8K one, whose radiance takes 400 MB."""
@@ -165,6 +177,92 @@ def test_a_crash_while_a_scene_is_read_is_an_error_of_that_scene(tmp_path: Path)
         os.utime(scene)
         assert httpx.get(path, params=SMALL, timeout=PATIENCE_S).status_code == 200
         assert "gazetrace_crashes 0.0" in httpx.get(f"{service.address}/metrics").text
+
+
+def scenes_at_work(service: ServiceProcess) -> set[str]:
+    """What the service has noted; nothing while it is being started."""
+    with suppress(OSError, IndexError):
+        for link in Path(f"/proc/{service.pid}/fd").iterdir():
+            if os.readlink(link).startswith("/memfd:gazetrace-notes"):
+                with link.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as memory:
+                    return {edition.scene_id for edition in WorkNotes(memory).at_work()}
+    return set()
+
+
+def end_while_tracing(
+    service: ServiceProcess, scene_id: str, number: signal.Signals, asked: Future[httpx.Response], served: list[int]
+) -> None:
+    """End the service when it has served others while it traces a large frame of a scene; return when it has ended."""
+    before: int | None = None
+    while before is None or served.count(200) == before:
+        assert not asked.done(), asked.result()
+        with suppress(httpx.TransportError):
+            metrics = httpx.get(f"{service.address}/metrics", timeout=PATIENCE_S).text
+            (lent,) = (float(line.split()[1]) for line in metrics.splitlines() if line.startswith(LENT))
+            if lent >= LARGE_BYTES and scene_id in scenes_at_work(service):
+                before = served.count(200) if before is None else before
+    pid = service.pid
+    os.kill(pid, number)
+    while Path(f"/proc/{pid}").exists():
+        pass
+
+
+def test_a_scene_that_crashes_each_time_is_refused_until_its_files_change_and_others_are_served(tmp_path: Path) -> None:
+    scene = tmp_path / "bad" / "scene.toml"
+    scene.parent.mkdir()
+    scene.write_text("[[sphere]]\ncenter = [0, 0, 0]\nradius = 1\n")
+    over = threading.Event()
+    statuses: list[int] = []
+
+    def ask_for_others(address: str) -> None:
+        while not over.is_set():
+            with suppress(httpx.TransportError):
+                query = {**SMALL, "gaze_x": len(statuses) % 64}
+                statuses.append(
+                    httpx.get(f"{address}/v1/scenes/matte/frame", params=query, timeout=PATIENCE_S).status_code
+                )
+
+    def ask_for_bad(address: str, query: Mapping[str, str | int]) -> httpx.Response:
+        while True:
+            with suppress(httpx.TransportError):
+                reply = httpx.get(f"{address}/v1/scenes/bad/frame", params=query, timeout=PATIENCE_S)
+                if reply.status_code != 503:
+                    return reply
+
+    with (
+        service_process("--threads", "1", "--log-json", "--scenes-folder", str(tmp_path)) as service,
+        ThreadPoolExecutor(2) as clients,
+    ):
+        try:
+            others = clients.submit(ask_for_others, service.address)
+            asked = clients.submit(ask_for_bad, service.address, LARGE)
+            for number in (signal.SIGKILL, signal.SIGSEGV, signal.SIGABRT):
+                end_while_tracing(service, "bad", number, asked, statuses)
+            refused = asked.result(PATIENCE_S)
+            served = statuses.count(200)
+            assert (refused.status_code, refused.json()["type"]) == (422, "urn:gazetrace:problem:broken-scene")
+            assert "bad: expected a scene that can be rendered, found that" in refused.json()["detail"]
+            with viewer(service.address) as found:
+                found.say(configure(scene="bad"))
+                assert found.next(protocol.Error).message == refused.json()["detail"]
+            quarantined = 'gazetrace_quarantined_scenes{scene="bad"} 1.0'
+            assert [quarantined] == [
+                line
+                for line in httpx.get(f"{service.address}/metrics").text.splitlines()
+                if line.startswith("gazetrace_quarantined_scenes")
+            ]
+            os.utime(scene)
+            assert ask_for_bad(service.address, SMALL).status_code == 200
+            assert "gazetrace_quarantined_scenes{" not in httpx.get(f"{service.address}/metrics").text
+            while statuses.count(200) == served:
+                assert not others.done()
+        finally:
+            over.set()
+        others.result(PATIENCE_S)
+    assert set(statuses) <= {200, 503}
+    logged = [line for line in service.lines if "scenes refused until their files change" in line]
+    assert len(logged) == 1
+    assert logged[0].count(": bad") == 1
 
 
 def test_a_full_disk_under_the_log_costs_lines_of_the_log(tmp_path: Path) -> None:

@@ -46,6 +46,7 @@ STATED = {
     "max_texture_pixels": ("6", 6),
     "max_load_s": ("7", 7),
     "max_load_bytes": ("8", 8),
+    "max_scene_crashes": ("9", 9),
     "allowed_hosts": ("render.example, lab", ("render.example", "lab")),
     "allowed_origins": ("https://lab.example", ("https://lab.example",)),
 }
@@ -112,6 +113,7 @@ def test_empty_and_foreign_variables_state_nothing() -> None:
         ("GAZETRACE_MAX_TEXTURE_PIXELS", "0"),
         ("GAZETRACE_MAX_LOAD_S", "0"),
         ("GAZETRACE_MAX_LOAD_BYTES", "0"),
+        ("GAZETRACE_MAX_SCENE_CRASHES", "1"),
         ("GAZETRACE_INSECURE", "maybe"),
         ("GAZETRACE_SCENES", "/no/such/folder"),
         ("GAZETRACE_TOKEN", "short"),
