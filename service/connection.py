@@ -12,6 +12,7 @@ from fastapi import FastAPI
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from service.headers import SECURITY_HEADERS
+from service.pace import Pace
 from service.problem import RETRY_AFTER_S, problem
 from service.request_log import connection_refused
 from service.settings import Settings
@@ -31,8 +32,8 @@ class Connection(H11Protocol):
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """Give the client its time, or send it away if there are too many."""
         self._request_timer: asyncio.TimerHandle | None = None
-        self._reply_timer: asyncio.TimerHandle | None = None
         super().connection_made(transport)
+        Pace(transport, self.settings, self._give_up_reader)
         if len(self.connections) > self.settings.max_connections:
             detail = f"this service has its {self.settings.max_connections} connections already"
             self._refuse(HTTPStatus.SERVICE_UNAVAILABLE, "too-many", detail, {"Retry-After": str(RETRY_AFTER_S)})
@@ -48,24 +49,18 @@ class Connection(H11Protocol):
         elif self._request_timer is None:
             self._await_request()
 
-    def pause_writing(self) -> None:
-        """The client reads slowly: it has so long to go on."""
-        super().pause_writing()
-        self._reply_timer = self.loop.call_later(self.settings.client_timeout_s, drop, self.transport)
-
-    def resume_writing(self) -> None:
-        """It goes on."""
-        _cancel(self._reply_timer)
-        super().resume_writing()
-
     def connection_lost(self, exc: Exception | None) -> None:
         """Forget the client."""
         _cancel(self._request_timer)
-        _cancel(self._reply_timer)
         super().connection_lost(exc)
 
     def _await_request(self) -> None:
         self._request_timer = self.loop.call_later(self.settings.client_timeout_s, self._give_up)
+
+    def _give_up_reader(self, why: str) -> None:
+        """The client takes in too little of what it is sent, be it a stream by now."""
+        connection_refused(self.service, None, "slow", why)
+        drop(self.transport)
 
     def _lacks_request(self) -> bool:
         return self.cycle is None or self.cycle.response_complete or self.cycle.more_body

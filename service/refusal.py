@@ -8,6 +8,7 @@ from pydantic import ValidationError
 
 from renderer.errors import SceneError, SettingsError, UnknownScene
 from service import protocol
+from service.jobs import Stopping
 from service.problem import OUT_OF_MEMORY, field_error, shown
 from service.rendering import NotReady, OverLimit
 
@@ -33,6 +34,8 @@ def refusal(error: Exception) -> protocol.Error:
         return protocol.Error("invalid-request", "expected configure before a change of it", "type")
     if isinstance(error, NotReady):
         return protocol.Error("not-ready", str(error))
+    if isinstance(error, Stopping):
+        return protocol.Error("stopping", str(error))
     if isinstance(error, protocol.ProtocolError):
         return protocol.Error("protocol", _cut(error.message), _cut(error.field))
     if isinstance(error, MemoryError):

@@ -10,8 +10,10 @@ import logging
 import secrets
 import sys
 import time
+from collections.abc import Mapping
 from datetime import UTC, datetime
 from http import HTTPStatus
+from typing import Any
 
 from starlette.applications import Starlette
 from starlette.datastructures import MutableHeaders
@@ -48,9 +50,10 @@ class RequestLog:
         scope[SAID] = said
         is_problem = False
         problem = b""
+        accepted = False
 
         async def send_and_see(message: Message) -> None:
-            nonlocal is_problem, problem
+            nonlocal accepted, is_problem, problem
             match message["type"]:
                 case "http.response.start":
                     headers = MutableHeaders(scope=message)
@@ -59,6 +62,11 @@ class RequestLog:
                     is_problem = message["status"] >= HTTPStatus.BAD_REQUEST
                 case "http.response.body" if is_problem:
                     problem += message.get("body", b"")
+                case "websocket.accept":
+                    accepted = True
+                case "websocket.close" if not accepted:
+                    why = "there is no such stream, only /v1/stream and /v1/gaze"
+                    said.update(status=HTTPStatus.FORBIDDEN, kind="not-found", why=why)
                 case "websocket.close":
                     said["status"], said["why"] = message.get("code"), message.get("reason")
                     said["kind"] = _close_kind(message.get("code"))
@@ -84,8 +92,14 @@ def name_session(scope: Scope, name: str) -> None:
     scope[SAID]["session"] = name
 
 
-def connection_refused(app: Starlette, status: int, kind: str, why: str) -> None:
-    """Log and count a connection that was ended before there was a request."""
+def stream_ended(scope: Mapping[str, Any], status: int | None, kind: str, why: str) -> None:
+    """Let the line of a stream's client say why the connection was ended without a word of the application."""
+    if SAID in scope:
+        scope[SAID].update(status=status, kind=kind, why=why)
+
+
+def connection_refused(app: Starlette, status: int | None, kind: str, why: str) -> None:
+    """Log and count a connection that was ended before there was a request, or apart from any."""
     app.state.desk.studio.metrics.refused("connection", kind)
     said: dict[str, object] = {"event": "connection", "status": status, "kind": kind, "why": why}
     log.info("connection", extra={"said": said})

@@ -12,7 +12,7 @@ from fastapi import FastAPI
 from service.app import create_app
 from service.connection import connection_of, drop
 from service.settings import Settings
-from service.stream_connection import StreamConnection
+from service.stream_connection import stream_connection_of
 from service.watch import Watch
 
 GOODBYE_S = 4
@@ -59,7 +59,7 @@ def server_config(app: FastAPI, settings: Settings) -> uvicorn.Config:
         access_log=False,
         http=connection_of(settings, app),
         h11_max_incomplete_event_size=settings.max_header_bytes,
-        ws=StreamConnection,
+        ws=stream_connection_of(app),
         ws_max_size=settings.max_message_bytes,
         ws_ping_interval=settings.ping_s,
         ws_ping_timeout=settings.ping_s,

@@ -7,6 +7,7 @@ rendering and encoding happens on the event loop.
 from __future__ import annotations
 
 import asyncio
+import logging
 import threading
 from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass, replace
@@ -41,6 +42,9 @@ TICK_S = 0.05
 
 STATUS_NS = 1000 * NS_PER_MS
 """How often counts are told while frames are rendered."""
+
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(slots=True)
@@ -393,6 +397,7 @@ class Session:
         refused = refusal(error)
         if refused != self._refusal:
             self._refusal = refused
+            log.info("session %s: frame refused: %s", self.name, refused.message)
             self._tell(refused)
 
     def _drop_progress(self) -> None:

@@ -65,7 +65,8 @@ class Settings:
         max_body_bytes: largest request body.
         max_header_bytes: largest head of a request: its first line and its headers.
         max_connections: connections at once, streams among them; beyond, a client is told to come back.
-        client_timeout_s: how long a client may take to send a request, and may leave a reply unread [s].
+        client_timeout_s: how long a client may take to send a request, and may leave unread what it is sent [s].
+        min_bytes_per_s: least that a client must take in of what waits for it, on average over that time [1/s].
         max_concurrent_renders: frames rendered at once.
         max_queued_renders: frames that may wait for their turn; beyond, a client is told to come back.
         max_sessions: streaming sessions at once.
@@ -112,6 +113,7 @@ class Settings:
     max_header_bytes: int = 32 << 10
     max_connections: int = 512
     client_timeout_s: int = 20
+    min_bytes_per_s: int = 4096
     max_concurrent_renders: int = 4
     max_queued_renders: int = 16
     max_sessions: int = 16
@@ -147,6 +149,7 @@ class Settings:
         require_integer("max_header_bytes", self.max_header_bytes, LEAST_HEADER_BYTES, MOST_HEADER_BYTES)
         require_integer("max_connections", self.max_connections, 1, MOST_CONNECTIONS)
         require_integer("client_timeout_s", self.client_timeout_s, 1, LONGEST_CLIENT_TIMEOUT_S)
+        require_integer("min_bytes_per_s", self.min_bytes_per_s, 1, MOST_BYTES)
         require_integer("max_concurrent_renders", self.max_concurrent_renders, 1, MOST_RENDERS)
         require_integer("max_queued_renders", self.max_queued_renders, 0, MOST_QUEUED)
         require_integer("max_sessions", self.max_sessions, 1, MOST_SESSIONS)

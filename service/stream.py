@@ -108,7 +108,7 @@ async def _answer(websocket: WebSocket, talk: Callable[[WebSocket, Desk], Awaita
     except Refused as refused:
         with contextlib.suppress(WebSocketDisconnect):
             await _deliver(websocket.send_text(protocol.encode(refused.error)))
-            await _deliver(websocket.close(refused.code, _reason(refused.error.message)))
+            await _deliver(websocket.close(refused.code, _reason(refused.error)))
     except WebSocketDisconnect:
         return
 
@@ -234,7 +234,7 @@ async def _send(websocket: WebSocket, outbox: Outbox) -> None:
     while True:
         match await outbox.next():
             case Close() as end:
-                await _deliver(websocket.close(end.code, _reason(end.reason)))
+                await _deliver(websocket.close(end.code, _cut(end.reason)))
                 return
             case str() as text:
                 await _deliver(websocket.send_text(text))
@@ -316,7 +316,12 @@ def _check_token(websocket: WebSocket, hello: protocol.Hello, right: Right) -> f
     return rights
 
 
-def _reason(text: str) -> str:
+def _reason(error: protocol.Error) -> str:
+    """An error as a reason for the end of a connection."""
+    return _cut(error.message if error.field is None else f"{error.field}: {error.message}")
+
+
+def _cut(text: str) -> str:
     """As much of a reason as a close frame holds."""
     return text.encode()[:LONGEST_REASON_BYTES].decode(errors="ignore")
 

@@ -29,6 +29,7 @@ STATED = {
     "max_header_bytes": ("4096", 4096),
     "max_connections": ("4", 4),
     "client_timeout_s": ("3", 3),
+    "min_bytes_per_s": ("10", 10),
     "max_concurrent_renders": ("2", 2),
     "max_queued_renders": ("0", 0),
     "max_sessions": ("2", 2),
