@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from clients.command_line.clip_text import clip_record, clip_text
 from clients.command_line.cluster import add_cluster, check_cluster, joined
-from clients.command_line.errors import OK, UsageError
+from clients.command_line.errors import OK, CommandFailed, UsageError
 from clients.command_line.fingerprint import fingerprint
 from clients.command_line.frame_flags import add_frame_flags, frame_request
 from clients.command_line.frame_folder import FrameFolder
@@ -282,11 +282,19 @@ def drawn(
 
 
 def assemble(video: Path, frames: FrameFolder, count: int, fps: Fraction, size: tuple[int, int]) -> None:
-    """Put the pictures together into the video."""
+    """Put the pictures together into the video.
+
+    Raises:
+        CommandFailed: where it cannot be written, as on a full disk.
+    """
     from clients.video import write_video
 
-    with counting(f"writing {video.name}", count) as tick:
-        write_video(video, _pictures(frames, count, tick), fps, size)
+    try:
+        with counting(f"writing {video.name}", count) as tick:
+            write_video(video, _pictures(frames, count, tick), fps, size)
+    except OSError as error:
+        kept = f"all frames are kept in {frames.folder}, and the same command goes on once this is mended"
+        raise CommandFailed(f"{video}: {error.strerror}; {kept}") from error
 
 
 def _pictures(frames: FrameFolder, count: int, tick: Any) -> Iterator[NDArray[np.uint8]]:

@@ -9,6 +9,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Final
 
+from clients.command_line.errors import CommandFailed, one_line
 from clients.command_line.journal import Journal, Request
 from clients.command_line.render import write_whole
 
@@ -61,9 +62,17 @@ class FrameFolder:
         return self.folder / (self.pattern % frame)
 
     def add(self, frame: int, picture: bytes, cost: dict[str, Any]) -> None:
-        """Keep a finished frame."""
-        write_whole(self.path(frame), picture)
-        self._journal.add({"frame": frame, "cost": cost})
+        """Keep a finished frame.
+
+        Raises:
+            CommandFailed: where it cannot be written, as on a full disk.
+        """
+        try:
+            write_whole(self.path(frame), picture)
+            self._journal.add({"frame": frame, "cost": cost})
+        except OSError as error:
+            kept = f"{len(self.costs)} finished frames are kept, and the same command goes on once this is mended"
+            raise CommandFailed(f"{one_line(error)}; {kept}") from error
         self.costs[frame] = cost
 
     def remove(self) -> None:

@@ -54,13 +54,24 @@ class Journal:
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
         """Leave everything as it is, for the next run."""
-        self._file.close()
+        try:
+            self._file.close()
+        except OSError:  # what could not be added before still cannot
+            if error is None:
+                raise
 
     def add(self, record: dict[str, Any]) -> None:
-        """Keep a record."""
+        """Keep a record.
+
+        Raises:
+            OSError: naming the file; half a record at its end does not count.
+        """
         self._file.seek(0, os.SEEK_END)
-        self._file.write(json.dumps(record).encode() + b"\n")
-        self._file.flush()
+        try:
+            self._file.write(json.dumps(record).encode() + b"\n")
+            self._file.flush()
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, str(self.path)) from error
 
     def start_over(self) -> None:
         """Forget all records."""

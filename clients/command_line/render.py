@@ -177,11 +177,17 @@ def require_fit(display: Display, image_format: str) -> None:
 
 
 def write_whole(path: Path, data: bytes) -> None:
-    """Write `data` beside `path` first, so that nobody ever finds half a file under that name."""
+    """Write `data` beside `path` first, so that nobody ever finds half a file under that name.
+
+    Raises:
+        OSError: naming `path`.
+    """
     partial = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         partial.write_bytes(data)
         partial.replace(path)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(path)) from error
     finally:
         partial.unlink(missing_ok=True)
 

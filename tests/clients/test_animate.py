@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import sys
 from pathlib import Path
@@ -16,6 +17,7 @@ from clients.command_line.errors import UsageError
 from clients.command_line.frame_folder import LOG, FrameFolder
 from renderer.codec import decode_texture
 from tests.clients.commands import failing, interrupted
+from tests.small_disk import enlarge, small_disk
 
 pytestmark = pytest.mark.usefixtures("plain_environment")
 
@@ -23,6 +25,9 @@ SCREEN = ("--size", "96x54", "--screen-cm", "20", "--samples", "2", "--acuity-sc
 EYE = "t_ms,x_px,y_px,valid\n0,20,10,1\n30,,,0\n70,60.5,40,1\n79,5,5,1\n80,-9,70,1\n100,48,27,1\n"
 SHOWN = ["20,10", "20,10", "-9,70"]
 """Gaze at 0, 40 and 80 ms: the first, the one before the blink, the newest."""
+
+LONG = ("matte", *SCREEN, "--gaze-trace", "simulated", "--seconds", "0.8")
+"""More frames than a small disk holds."""
 
 REC709_LUMA = np.array([0.2126, 0.7152, 0.0722])
 """Weights of red, green and blue in what a video keeps at full resolution."""
@@ -159,6 +164,52 @@ def test_ctrl_c_leaves_a_clip_that_goes_on(capsys: pytest.CaptureFixture[str], t
     assert len(pictures(tmp_path / "clip")) == int(stopped[1])
     lines = (tmp_path / "clip" / LOG).read_text().splitlines()
     assert [json.loads(line)["frame"] for line in lines[1:]] == list(range(int(stopped[1])))
+
+
+def test_a_full_disk_is_one_line_and_what_was_finished_is_kept(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    whole = pictures_of(capsys, tmp_path / "elsewhere")
+    with small_disk(tmp_path / "disk", "64k") as disk:
+        for _ in range(2):
+            said = failing(capsys, "animate", *LONG, "-o", "disk/clip", status=1)
+            found = pictures(disk / "clip")
+            told = re.fullmatch(
+                rf"gazetrace: disk/clip/(frame-\d+.png|{LOG}): No space left on device; (\d+) .*\n", said
+            )
+            assert told is not None, said
+            kept = int(told[2])
+            assert kept == (disk / "clip" / LOG).read_bytes().count(b"\n") - 1
+            assert kept <= len(found) <= kept + 1  # of the last one there may be no record; it is made again
+            assert 0 < len(found) < len(whole)
+            assert found.items() <= whole.items()
+            assert {path.name for path in (disk / "clip").iterdir()} == {LOG, *found}
+        enlarge(disk, "1m")
+        assert animate(capsys, *LONG, "-o", "disk/clip")["frames_rendered"] == len(whole) - kept
+        assert pictures(disk / "clip") == whole
+
+
+def test_a_disk_full_under_the_video_keeps_its_frames(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    pytest.importorskip("av")
+    with small_disk(tmp_path / "disk", "1m") as disk:
+        whole = pictures_of(capsys, disk / "clip.mp4.frames")
+        room = os.statvfs(disk)
+        (disk / "filler").write_bytes(b"x" * (room.f_bfree * room.f_bsize))
+        said = failing(capsys, "animate", *LONG, "-o", "disk/clip.mp4", status=1)
+        assert said.startswith(
+            "gazetrace: disk/clip.mp4: No space left on device; all frames are kept in disk/clip.mp4."
+        )
+        assert {path.name for path in disk.iterdir()} == {"filler", "clip.mp4.frames"}
+        assert pictures(disk / "clip.mp4.frames") == whole
+        (disk / "filler").unlink()
+        assert animate(capsys, *LONG, "-o", "disk/clip.mp4")["frames_rendered"] == 0
+        assert {path.name for path in disk.iterdir()} == {"clip.mp4"}
+
+
+def pictures_of(capsys: pytest.CaptureFixture[str], folder: Path) -> dict[str, bytes]:
+    """All frames of the clip, in a folder."""
+    animate(capsys, *LONG, "-o", f"{folder}/")
+    return pictures(folder)
 
 
 def test_another_request_starts_over_and_says_so(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
