@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.acuity import Acuity
+from renderer.allocator import apart
 from renderer.display import Display
 from renderer.eccentricity import EyeGeometry, eye_geometry, fill_cell_sizes, largest_cell_side
 from renderer.gaze import GazeBucket
@@ -81,9 +82,10 @@ def cell_sizes(display: Display, acuity: Acuity, bucket: GazeBucket) -> NDArray[
 
 def _full_map(display: Display, bucket: GazeBucket) -> CellMap:
     width, height = display.width_px, display.height_px
-    mask = np.arange(width * height, dtype=np.int32).reshape(height, width)
-    y, x = (part.ravel() for part in np.indices(mask.shape, dtype=np.int32))
-    return CellMap("full", bucket, x, y, np.ones_like(x), mask)
+    x, y, side, mask = (apart((height, width), np.int32) for _ in range(4))
+    x[:], y[:] = np.arange(width), np.arange(height)[:, None]
+    side[:], mask[:] = 1, np.arange(width * height).reshape(height, width)
+    return CellMap("full", bucket, x.ravel(), y.ravel(), side.ravel(), mask)
 
 
 def _aligned_map(eye: EyeGeometry, bucket: GazeBucket, pool: Workers) -> CellMap:
@@ -100,8 +102,8 @@ def _aligned_map(eye: EyeGeometry, bucket: GazeBucket, pool: Workers) -> CellMap
 
     pool.run(tile, len(tops))
     first = np.concatenate(([0], np.cumsum(counts)))
-    x, y, side = (np.empty(int(first[-1]), dtype=np.int32) for _ in range(3))
-    mask = np.empty((eye.height_px, eye.width_px), dtype=np.int32)
+    x, y, side = (apart(int(first[-1]), np.int32) for _ in range(3))
+    mask = apart((eye.height_px, eye.width_px), np.int32)
 
     def number(strip: int) -> None:
         number_cells(tops[strip], int(first[strip]), corners[strip], sides[strip], x, y, side, mask)
@@ -120,8 +122,9 @@ def _scanline_map(eye: EyeGeometry, bucket: GazeBucket, pool: Workers) -> CellMa
 
     pool.run(measure, -(-eye.height_px // FULL_STRIP_ROWS))
     corners = np.zeros(shape, dtype=np.uint16)
-    mask = np.full(shape, -1, dtype=np.int32)
+    mask = apart(shape, np.int32)
+    mask[:] = -1
     count = mark_scanline(sizes, corners, mask)
-    x, y, side = (np.zeros(count, dtype=np.int32) for _ in range(3))
+    x, y, side = (apart(count, np.int32) for _ in range(3))
     number_scanline_cells(corners, x, y, side)
     return CellMap("scanline", bucket, x, y, side, mask)

@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.allocator import apart
 from renderer.cellmap import CellMap
 from renderer.frame import Abandoned
 from renderer.kernel import kernel
@@ -82,16 +83,16 @@ class SampleStore:
         self._lock = threading.Lock()
         decided = slots if adaptive else 0
         self.spread = Spread(
-            low=np.zeros(decided, dtype=np.float32),
-            high=np.zeros(decided, dtype=np.float32),
-            square=np.zeros(decided, dtype=np.float32),
-            settled=np.zeros(decided, dtype=np.uint8),
+            low=apart(decided, np.float32, zeroed=True),
+            high=apart(decided, np.float32, zeroed=True),
+            square=apart(decided, np.float32, zeroed=True),
+            settled=apart(decided, np.uint8, zeroed=True),
         )
         self.samples = Samples(
-            total=np.empty((slots, 3), dtype=np.float32),
-            shown=np.empty(slots, dtype=np.float32),
-            square=np.empty(slots, dtype=np.float32),
-            number=np.zeros(slots, dtype=np.int32),
+            total=apart((slots, 3), np.float32),
+            shown=apart(slots, np.float32),
+            square=apart(slots, np.float32),
+            number=apart(slots, np.int32, zeroed=True),
         )
 
     @contextmanager
@@ -130,10 +131,11 @@ def aligned_slots(width: int, height: int) -> int:
 
 def slots_of(cell_map: CellMap, pool: Workers) -> NDArray[np.int64]:
     """(n,) int64 slot of each cell: by side, row and column for aligned and full maps, else its number."""
+    slots = apart(cell_map.cells, np.int64)
     if cell_map.kind == "scanline":
-        return np.arange(cell_map.cells)
+        slots[:] = np.arange(cell_map.cells)
+        return slots
     height, width = cell_map.mask.shape
-    slots = np.empty(cell_map.cells, dtype=np.int64)
     sides, starts = aligned_levels(width, height)
     first = np.zeros(int(sides[-1]) + 1, dtype=np.int64)
     columns = np.zeros_like(first)

@@ -100,7 +100,10 @@ class WorkerPool:
             job.done.wait()
             raise
         if job.error is not None:
-            raise job.error
+            try:
+                raise job.error
+            finally:
+                del job  # the error refers to this call: the two would keep each other, and all arrays of the frame
 
     def until(self, abandon: threading.Event | None) -> Workers:
         """The same workers for jobs that end as soon as `abandon` is set."""
@@ -156,6 +159,7 @@ class WorkerPool:
             job.finished += 1
             if job.finished == job.count:
                 job.done.set()
+        del job, error  # as in `run`
         return True
 
 

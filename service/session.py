@@ -334,6 +334,7 @@ class Session:
             return rendering.result()
         finally:
             abandon.set()
+            del rendering  # its error refers to this call: the two would keep each other, and the frame's memory
 
     def _overtaken(self, configuration: Configuration, progress: Progress, began_ns: int) -> bool:
         """Whether what is being rendered is no longer worth its time.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import gc
 import signal
 import threading
 import weakref
@@ -290,6 +292,27 @@ def test_an_idle_worker_holds_on_to_nothing(pool: WorkerPool) -> None:
     pool.run(picture.draw, 10)
     del picture
     assert freed.wait(PATIENCE_S)
+
+
+@pytest.mark.parametrize("error", [Abandoned, MemoryError])
+def test_a_job_that_failed_keeps_nothing_until_garbage_is_collected(pool: WorkerPool, error: type[Exception]) -> None:
+    """Its arrays are most of a frame's memory, and the oldest garbage is looked for seldom."""
+
+    class Picture:
+        def draw(self, _: int) -> None:
+            raise error
+
+    picture, freed = Picture(), threading.Event()
+    weakref.finalize(picture, freed.set)
+    gc.collect()
+    gc.disable()
+    try:
+        with contextlib.suppress(error):
+            pool.run(picture.draw, 10)
+        del picture
+        assert freed.wait(PATIENCE_S)
+    finally:
+        gc.enable()
 
 
 def test_ctrl_c_waits_for_the_blocks_begun_and_begins_no_other(pool: WorkerPool) -> None:

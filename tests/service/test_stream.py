@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import io
 from collections.abc import Iterator
 from typing import Any
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from renderer.frame import Abandoned
 from renderer.pipeline import Renderer
 from service.protocol import Ack, Camera, Error, Frame, Gaze, Quality, Ready, Status
 from service.settings import Settings
@@ -199,6 +201,24 @@ def test_a_camera_that_moves_all_the_time_is_seen(address: str) -> None:
             shown.append(eye.frame().header.config)
         assert shown == sorted(shown)
         eye.next(Frame, lambda frame: frame.header.phase == "final")
+
+
+def test_a_frame_that_was_given_up_leaves_no_garbage(address: str) -> None:
+    """What it held would stay until the oldest garbage is looked for, which is seldom."""
+    gc.collect()
+    gc.disable()
+    try:
+        with viewer(address) as eye:
+            eye.say(configure(0, "spheres", quality={"samples_per_cell": 64}))
+            for turn in range(1, 8):
+                eye.say(Camera(turn, {"position": [turn / 10, 2, 8], "look_at": [0, 1, 0]}))
+                while eye.frame().header.config != turn:
+                    pass
+            eye.final()
+            given_up = [thing for thing in gc.get_objects() if type(thing) is Abandoned]
+    finally:
+        gc.enable()
+    assert not given_up
 
 
 def test_a_refused_configuration_leaves_the_one_in_force(address: str) -> None:
