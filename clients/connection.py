@@ -19,6 +19,12 @@ from service import protocol
 MOST_FRAME_BYTES: Final = 1 << 30
 """Longest frame that is taken in: a raw 8K picture is 400 MB."""
 
+PING_S: Final = 20.0
+"""How often the service is asked whether it is there [s]."""
+
+SILENCE_S: Final = 2 * PING_S
+"""How long nothing may arrive, not a byte of anything, before the connection is given up [s]."""
+
 OPEN_S: Final = 10.0
 """How long a service may take to answer a new connection."""
 
@@ -57,6 +63,33 @@ def stream_url(url: str, path: str) -> str:
     return urlunsplit((SCHEMES[parts.scheme], parts.netloc, parts.path.rstrip("/") + path, parts.query, ""))
 
 
+class _Connection(ClientConnection):
+    """A connection kept for as long as anything arrives: an answer may be stuck behind a frame on a slow line."""
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """Begin to listen."""
+        super().connection_made(transport)
+        self._arrived_s = self.loop.time()
+        self._timer = self.loop.call_later(SILENCE_S, self._listen)
+
+    def data_received(self, data: bytes) -> None:
+        """The service lives."""
+        self._arrived_s = self.loop.time()
+        super().data_received(data)
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """There is no more to hear."""
+        self._timer.cancel()
+        super().connection_lost(exc)
+
+    def _listen(self) -> None:
+        left_s = self._arrived_s + SILENCE_S - self.loop.time()
+        if left_s > 0:
+            self._timer = self.loop.call_later(left_s, self._listen)
+        else:
+            self.transport.abort()
+
+
 async def stay_connected(
     url: str, talk: Callable[[ClientConnection], Awaitable[None]], heard_s: Callable[[], float], patience_s: float
 ) -> None:
@@ -82,6 +115,9 @@ async def stay_connected(
                 max_size=MOST_FRAME_BYTES,
                 compression=None,
                 open_timeout=OPEN_S,
+                ping_interval=PING_S,
+                ping_timeout=None,
+                create_connection=_Connection,
                 proxy=None,
             ) as connection:
                 await talk(connection)

@@ -45,7 +45,7 @@ PATIENCE_S: Final = 30.0
 FIRST_PINGS: Final = 5
 FIRST_PINGS_S: Final = 0.05
 PINGS_S: Final = 0.25
-"""Seconds between round trips: five quick ones on a new connection, then four a second."""
+"""Seconds between round trips: five quick ones on a new connection, then four a second at most."""
 
 PASSING: Final = frozenset({"not-ready", "stopping", "idle", "too-many"})
 """Refusals that call for nothing but patience."""
@@ -131,6 +131,7 @@ class Display:
         self._failure: Exception | None = None
         self._to_send = asyncio.Event()
         self._news = asyncio.Event()
+        self._answered = asyncio.Event()
         self._task: asyncio.Task[None] | None = None
 
     async def __aenter__(self) -> Display:
@@ -300,9 +301,12 @@ class Display:
                 await self._to_send.wait()
 
     async def _ping(self) -> None:
+        """Measure round trips, one at a time: on a slow line the answers would pile up behind a frame."""
         for number in itertools.count():
+            self._answered.clear()
             self._send(protocol.Ping(number, time.monotonic_ns()))
             await asyncio.sleep(FIRST_PINGS_S if number < FIRST_PINGS else PINGS_S)
+            await self._answered.wait()
 
     def _hear(self, data: str | bytes) -> None:
         received_ns = time.monotonic_ns()
@@ -312,6 +316,7 @@ class Display:
         else:
             match protocol.decode_stream_down(data):
                 case protocol.Pong() as pong:
+                    self._answered.set()
                     self.clock.answered(pong.client_time_ns, pong.service_time_ns, received_ns)
                 case protocol.Status() as status:
                     self.status = status

@@ -200,7 +200,7 @@ export class Stream {
   }
 
   #ping() {
-    if (!this.connected) return;
+    if (!this.connected || this.#pings.size > 0) return;
     const now = performance.now();
     this.#pings.set(++this.#lastPing, now);
     this.#send({ type: "ping", id: this.#lastPing, client_time_ns: Math.round(now * NS_PER_MS) });

@@ -14,6 +14,8 @@ from typing import Any, TypeVar
 import numpy as np
 import pytest
 
+from clients import connection
+from clients import display as display_client
 from clients.connection import ServiceGone, ServiceRefused, stream_url
 from clients.decoding import decode_image
 from clients.display import Display, DisplayFrame
@@ -22,6 +24,7 @@ from renderer.pipeline import Renderer
 from service.protocol import FrameHeader, ProtocolError, ServiceTimes
 from service.settings import Settings
 from tests.service.conftest import PATIENCE_S, serving
+from tests.service.slow_line import SlowLine, slow_line
 
 Result = TypeVar("Result")
 
@@ -242,6 +245,29 @@ def test_it_comes_back_when_the_service_does(renderer: Renderer) -> None:
                     await display.__aexit__(None, None, None)
 
     run(work())
+
+
+def test_it_stays_on_a_slow_line_and_leaves_one_on_which_nothing_comes(
+    renderer: Renderer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A frame takes three seconds: longer than the service has to answer, and than as many answers may wait."""
+    monkeypatch.setattr(display_client, "PINGS_S", 0.001)
+    monkeypatch.setattr(connection, "PING_S", 0.25)
+    monkeypatch.setattr(connection, "SILENCE_S", 1.5)
+
+    async def work(line: SlowLine) -> None:
+        async with Display(line.url, patience_s=1.0) as display:
+            await display.configure("matte", display={"width_px": 200, "height_px": 110}, quality=COARSE, format="raw")
+            began = time.monotonic()
+            await display.next_frame()
+            assert time.monotonic() - began > 2.0
+            assert display.connections == 1
+            line.bytes_per_s = 0
+            with pytest.raises(ServiceGone):
+                await final(display)
+
+    with serving(Settings(port=0), renderer) as address, slow_line(address, 80_000) as line:
+        run(work(line))
 
 
 def test_it_gives_up_after_its_patience() -> None:

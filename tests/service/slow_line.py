@@ -7,7 +7,8 @@ import socket
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from functools import cached_property
 
 from tests.service.conftest import PATIENCE_S
 
@@ -22,7 +23,7 @@ class SlowLine:
     """Carries one connection: what the client says at once, what the service says at `bytes_per_s`.
 
     Attributes:
-        client: the client's end.
+        url: where a client may connect, once.
         bytes_per_s: may be changed at any time; 0: nothing passes.
         passed: bytes that came down to the client.
     """
@@ -30,18 +31,19 @@ class SlowLine:
     def __init__(self, address: str, bytes_per_s: float) -> None:
         self.bytes_per_s = bytes_per_s
         self.passed = 0
-        with socket.create_server(("127.0.0.1", 0)) as listener:
-            self.client = socket.create_connection(listener.getsockname())
-            self._near, _ = listener.accept()
-        self._far = socket.socket()
-        self._far.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER_BYTES)  # before there is a window to tell
-        self._near.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, BUFFER_BYTES)
-        host, port = address.removeprefix("http://").split(":")
-        self._far.connect((host, int(port)))
+        self._address = address
+        self._listener = socket.create_server(("127.0.0.1", 0))
+        self._listener.settimeout(GLANCE_S)
+        self.url = f"http://127.0.0.1:{self._listener.getsockname()[1]}"
         self._moved = threading.Condition()
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._carry)
         self._thread.start()
+
+    @cached_property
+    def client(self) -> socket.socket:
+        """The end of a client that is connected."""
+        return socket.create_connection(self._listener.getsockname())
 
     def wait(self, passed: int) -> None:
         """Return when so many bytes have come down to the client."""
@@ -53,17 +55,38 @@ class SlowLine:
         self._over.set()
         self._thread.join(PATIENCE_S)
         assert not self._thread.is_alive()
-        self.client.close()
+        if "client" in vars(self):
+            self.client.close()
+
+    def _connect(self) -> tuple[socket.socket, socket.socket] | None:
+        """The client that connects, and the service behind; None if the line is to end before."""
+        with self._listener:
+            while not self._over.is_set():
+                with suppress(TimeoutError):
+                    near, _ = self._listener.accept()
+                    far = socket.socket()
+                    far.setsockopt(
+                        socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER_BYTES
+                    )  # before there is a window to tell
+                    near.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, BUFFER_BYTES)
+                    host, port = self._address.removeprefix("http://").split(":")
+                    far.connect((host, int(port)))
+                    return near, far
+        return None
 
     def _carry(self) -> None:
+        ends = self._connect()
+        if ends is None:
+            return
+        near, far = ends
         due = time.monotonic()
-        with self._near, self._far:
+        with near, far:
             while not self._over.is_set():
                 now = time.monotonic()
                 may_pass = self.bytes_per_s > 0 and now >= due
                 wait_s = GLANCE_S if may_pass or due <= now else min(GLANCE_S, due - now)
-                readable, _, _ = select.select([self._near, *([self._far] if may_pass else [])], [], [], wait_s)
-                for end, other in ((self._near, self._far), (self._far, self._near)):
+                readable, _, _ = select.select([near, *([far] if may_pass else [])], [], [], wait_s)
+                for end, other in ((near, far), (far, near)):
                     if end not in readable:
                         continue
                     try:
@@ -73,7 +96,7 @@ class SlowLine:
                         return
                     if not data:
                         return
-                    if end is self._far:
+                    if end is far:
                         with self._moved:
                             self.passed += len(data)
                             self._moved.notify_all()
