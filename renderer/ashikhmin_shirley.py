@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 
 from renderer.kernel import formula
+from renderer.lanes import choose, exponential, least, logarithm_beside_one, most, natural_logarithm, root
 
 DIFFUSE_SCALE = 28.0 / (23.0 * math.pi)
 """Of the diffuse term, equation 5: makes an albedo of Rd (1 - Rs) at normal incidence nearly whole."""
@@ -23,14 +24,15 @@ def lobe_power(along: float, across: float, up: float, nu: float, nv: float) -> 
     is 1 where they meet.
 
     Args:
-        along, across, up: (h.u)^2, (h.v)^2 and n.h, above 0.
+        along, across, up: (h.u)^2, (h.v)^2 and n.h, above 0; numbers or lanes.
         nu, nv: exponents.
     """
     square = along + across
-    if not square > 0.0:
-        return 1.0
-    logarithm = 0.5 * math.log1p(-square) if square < 0.5 else math.log(up)
-    return math.exp(min(0.0, logarithm / square * (nu * along + nv * across)))
+    bent = square > 0.0
+    small = square < 0.5
+    logarithm = choose(small, 0.5 * logarithm_beside_one(bent & small, -square), natural_logarithm(square >= 0.5, up))
+    exponent = least(0.0, logarithm / square * (nu * along + nv * across))
+    return choose(bent, exponential(bent, exponent), 1.0)
 
 
 @formula
@@ -58,7 +60,7 @@ def ashikhmin_shirley(
     ray, h has no direction and there is no highlight.
 
     Args:
-        nx, ny, nz: unit shading normal.
+        nx, ny, nz: unit shading normal; this and what follows are numbers or lanes.
         ux, uy, uz: unit tangent; any vector, 0 too, where the exponents are equal.
         nu, nv: exponents along and across the tangent.
         lx, ly, lz: unit direction to the light, above the shading normal's horizon.
@@ -68,22 +70,21 @@ def ashikhmin_shirley(
         highlight, schlick, matt.
     """
     toward_light = nx * lx + ny * ly + nz * lz
-    toward_eye = max(0.0, nx * vx + ny * vy + nz * vz)
+    toward_eye = most(0.0, nx * vx + ny * vy + nz * vz)
     matt = DIFFUSE_SCALE * matt_share(toward_light) * matt_share(toward_eye) * toward_light
     hx, hy, hz = lx + vx, ly + vy, lz + vz
-    length = math.sqrt(hx * hx + hy * hy + hz * hz)
-    up = (hx * nx + hy * ny + hz * nz) / length if length > 0.0 else 0.0
-    if not up > 0.0:
-        return 0.0, 0.0, matt
+    length = root(hx * hx + hy * hy + hz * hz)
+    up = choose(length > 0.0, (hx * nx + hy * ny + hz * nz) / length, 0.0)
+    upright = up > 0.0
     hx, hy, hz = hx / length, hy / length, hz / length
     sx, sy, sz = ny * hz - nz * hy, nz * hx - nx * hz, nx * hy - ny * hx
-    along_squared, across_squared = sx * sx + sy * sy + sz * sz, 0.0
-    if nu != nv:
-        along = hx * ux + hy * uy + hz * uz
-        across = hx * (ny * uz - nz * uy) + hy * (nz * ux - nx * uz) + hz * (nx * uy - ny * ux)
-        along_squared, across_squared = along * along, across * across
-    half_cosine = min(1.0, 0.5 * length)
-    power = lobe_power(along_squared, across_squared, up, nu, nv)
-    scale = math.sqrt((nu + 1.0) * (nv + 1.0)) / (8.0 * math.pi)
-    highlight = scale * power / half_cosine * (toward_light / max(toward_light, toward_eye))
-    return highlight, fifth(1.0 - half_cosine), matt
+    along = hx * ux + hy * uy + hz * uz
+    across = hx * (ny * uz - nz * uy) + hy * (nz * ux - nx * uz) + hz * (nx * uy - ny * ux)
+    grained = nu != nv
+    along = choose(grained, along * along, sx * sx + sy * sy + sz * sz)
+    across = choose(grained, across * across, 0.0)
+    half_cosine = least(1.0, 0.5 * length)
+    power = lobe_power(along, across, choose(upright, up, 1.0), nu, nv)
+    scale = root((nu + 1.0) * (nv + 1.0)) / (8.0 * math.pi)
+    highlight = scale * power / half_cosine * (toward_light / most(toward_light, toward_eye))
+    return choose(upright, highlight, 0.0), choose(upright, fifth(1.0 - half_cosine), 0.0), matt

@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 
 from renderer.kernel import formula
+from renderer.lanes import size
 from renderer.surface import Surface
 
 
@@ -35,13 +36,13 @@ def covered_area(s: Surface, width: float, density: float, dx: float, dy: float,
     """Area in texture coordinates of the patch of a surface that a ray covers.
 
     Args:
-        s: the surface.
+        s: the surface; this and what follows are numbers or lanes.
         width: of the ray where they meet, in scene units.
         density: texture coordinates per scene unit, the geometric mean of both directions.
         dx, dy, dz: unit direction of the ray.
     """
     across = width * density
-    return across * across / abs(s.gx * dx + s.gy * dy + s.gz * dz)
+    return across * across / size(s.gx * dx + s.gy * dy + s.gz * dz)
 
 
 @formula

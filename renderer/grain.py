@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.gather import pick
 from renderer.kernel import formula
+from renderer.lanes import choose, root
 from renderer.surface import Surface
 from renderer.tangent import tangent_of_normal
 
@@ -15,16 +15,16 @@ from renderer.tangent import tangent_of_normal
 @formula
 def across_normal(s: Surface, tx: float, ty: float, tz: float) -> tuple[float, float, float]:
     """Unit vector across the shading normal nearest to (tx, ty, tz), or that of the normal's own field where
-    there is none.
+    there is none. Takes numbers or lanes.
     """
     off = tx * s.nx + ty * s.ny + tz * s.nz
     tx, ty, tz = tx - off * s.nx, ty - off * s.ny, tz - off * s.nz
     square = tx * tx + ty * ty + tz * tz
-    if not square > 0.0:
-        out = 1.0 if s.entering else -1.0
-        tx, ty, tz = tangent_of_normal(out * s.nx, out * s.ny, out * s.nz)
-        square = tx * tx + ty * ty + tz * tz
-    inverse = 1.0 / math.sqrt(square)
+    known = square > 0.0
+    out = choose(s.entering, 1.0, -1.0)
+    ox, oy, oz = tangent_of_normal(out * s.nx, out * s.ny, out * s.nz)
+    tx, ty, tz = choose(known, tx, ox), choose(known, ty, oy), choose(known, tz, oz)
+    inverse = 1.0 / root(tx * tx + ty * ty + tz * tz)
     return tx * inverse, ty * inverse, tz * inverse
 
 
@@ -36,9 +36,9 @@ def triangle_tangent(
     b0 = 1.0 - b1 - b2
     return across_normal(
         s,
-        b0 * tangents[t, 0] + b1 * tangents[t, 3] + b2 * tangents[t, 6],
-        b0 * tangents[t, 1] + b1 * tangents[t, 4] + b2 * tangents[t, 7],
-        b0 * tangents[t, 2] + b1 * tangents[t, 5] + b2 * tangents[t, 8],
+        b0 * pick(tangents, t, 0) + b1 * pick(tangents, t, 3) + b2 * pick(tangents, t, 6),
+        b0 * pick(tangents, t, 1) + b1 * pick(tangents, t, 4) + b2 * pick(tangents, t, 7),
+        b0 * pick(tangents, t, 2) + b1 * pick(tangents, t, 5) + b2 * pick(tangents, t, 8),
     )
 
 

@@ -132,7 +132,7 @@ def _at(_context: Any, _address: Any, sample: Any) -> Any:
     def generate(target: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return builder.inttoptr(arguments[0], target.get_data_type(signature.args[1]).as_pointer())
 
-    return types.CPointer(sample)(types.int64, sample), generate  # type: ignore[no-untyped-call]
+    return types.CPointer(sample)(types.int64, sample), generate
 
 
 at: Any = intrinsic(_at)
@@ -140,5 +140,5 @@ at: Any = intrinsic(_at)
 
 def c_function(function: Callable[[Any], None]) -> Any:
     """Compile `function`, of one pointer to 64-bit words, for C to call; its `address` is what C wants."""
-    signature = types.void(types.CPointer(types.int64))  # type: ignore[no-untyped-call]
+    signature = types.void(types.CPointer(types.int64))
     return numba.cfunc(signature, cache=True, error_model="numpy")(function)

@@ -1,220 +1,109 @@
-"""The light on a surface: what each light sends to the eye by way of it, and the shadow rays that ask for it."""
+"""The light on surfaces: what they shine by themselves, and what each point light sends to the eye by way of them."""
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from renderer.area_light import see_light, towards_light
 from renderer.finish import Finish
-from renderer.kernel import formula, kernel
-from renderer.light_samples import LightSamples, light_sample, light_seed
-from renderer.rays import ShadowRays
-from renderer.reflectance import reflectance
+from renderer.gather import entry, held, keep
+from renderer.group import Group
+from renderer.kernel import formula
+from renderer.lanes import anywhere, choose, least, most, root
+from renderer.material_table import LIT
+from renderer.places import EYE, LIGHT_ROWS, LIGHTS, SENT, START, UNLIT, Places, keep_three
+from renderer.prepared import Surfaces
+from renderer.reflectance import even_light, reflectance, towards_eye
 from renderer.surface import OFFSET_ULPS, Surface
 
 
 @formula
-def _is_behind(material: Any, finish: Finish, lx: float, ly: float, lz: float) -> bool:
-    """Whether a bump looks through its own surface at the light in direction (lx, ly, lz)."""
-    return bool(material.normal_picture >= 0 and finish.hx * lx + finish.hy * ly + finish.hz * lz <= 0.0)
+def in_front(finish: Finish, lx: float, ly: float, lz: float) -> bool:
+    """Whether the surface, flat as it is under its bumps, faces the light in direction (lx, ly, lz)."""
+    return finish.hx * lx + finish.hy * ly + finish.hz * lz > 0.0
 
 
 @formula
-def _light_to_eye(
-    s: Surface,
-    material: Any,
-    finish: Finish,
-    light: Any,
-    vx: float,
-    vy: float,
-    vz: float,
-) -> tuple[float, float, float, float]:
-    """Radiance that a surface sends towards (vx, vy, vz) of one light,
-    nothing being in between, and 1 over the light's distance; 0 for a light behind the surface or in it.
+def point_light(
+    s: Surface, finish: Finish, light: Any, vx: float, vy: float, vz: float
+) -> tuple[float, float, float, float, bool, float, float, float]:
+    """Radiance that a surface sends towards the eye of one point light, nothing being in between.
+
+    Args:
+        s: the surface; this, `finish` and the direction are numbers or lanes.
+        finish: the material at this place.
+        light: LIGHT.
+        vx, vy, vz: direction `towards_eye`.
+
+    Returns:
+        The direction of the shadow ray, and how far it looks in lengths of that; whether the light lights the
+        surface at all, not from behind nor from within; and if so, red, green and blue.
     """
     tx, ty, tz = light.x - s.px, light.y - s.py, light.z - s.pz
     square = tx * tx + ty * ty + tz * tz
-    if not square > 0.0:
-        return 0.0, 0.0, 0.0, 0.0
-    inverse = 1.0 / math.sqrt(square)
-    tx, ty, tz = tx * inverse, ty * inverse, tz * inverse
-    cosine = tx * s.nx + ty * s.ny + tz * s.nz
-    if cosine <= 0.0 or _is_behind(material, finish, tx, ty, tz):
-        return 0.0, 0.0, 0.0, 0.0
-    red, green, blue = reflectance(s, material, finish, cosine, tx, ty, tz, vx, vy, vz)
+    apart = square > 0.0
+    inverse = 1.0 / root(choose(apart, square, 1.0))
+    lx, ly, lz = tx * inverse, ty * inverse, tz * inverse
+    cosine = lx * s.nx + ly * s.ny + lz * s.nz
+    lit = apart & (cosine > 0.0) & in_front(finish, lx, ly, lz)
+    red, green, blue = reflectance(s, finish, cosine, lx, ly, lz, vx, vy, vz)
     falloff = inverse * inverse
-    return red * (light.red * falloff), green * (light.green * falloff), blue * (light.blue * falloff), inverse
-
-
-@formula
-def _send(
-    s: Surface,
-    tx: float,
-    ty: float,
-    tz: float,
-    reach: float,
-    red: float,
-    green: float,
-    blue: float,
-    sample: int,
-    radiance: NDArray[np.float32],
-    shadows: ShadowRays,
-    n_shadows: int,
-) -> int:
-    """Write the shadow ray that decides about a light from (tx, ty, tz) off; without reach, add the light as it is.
-
-    Returns:
-        How many shadow rays there are now.
-    """
-    if not reach > 0.0:
-        radiance[sample, 0] += red
-        radiance[sample, 1] += green
-        radiance[sample, 2] += blue
-        return n_shadows
+    reach = 1.0 - OFFSET_ULPS * inverse * max(abs(light.x), max(abs(light.y), abs(light.z)))
     away = s.offset + s.lift
-    shadows.origin[n_shadows, 0] = s.px + away * s.gx
-    shadows.origin[n_shadows, 1] = s.py + away * s.gy
-    shadows.origin[n_shadows, 2] = s.pz + away * s.gz
-    shadows.direction[n_shadows, 0] = tx - away * s.gx
-    shadows.direction[n_shadows, 1] = ty - away * s.gy
-    shadows.direction[n_shadows, 2] = tz - away * s.gz
-    shadows.reach[n_shadows] = reach
-    shadows.light[n_shadows, 0] = red
-    shadows.light[n_shadows, 1] = green
-    shadows.light[n_shadows, 2] = blue
-    shadows.sample[n_shadows] = sample
-    return n_shadows + 1
+    return (
+        tx - away * s.gx, ty - away * s.gy, tz - away * s.gz, reach,
+        lit, red * (light.red * falloff), green * (light.green * falloff), blue * (light.blue * falloff),
+    )  # fmt: skip
 
 
 @formula
-def light_from_points(
-    s: Surface,
-    material: Any,
-    finish: Finish,
-    wr: float,
-    wg: float,
-    wb: float,
-    vx: float,
-    vy: float,
-    vz: float,
-    sample: int,
-    lights: NDArray[np.void],
-    radiance: NDArray[np.float32],
-    shadows: ShadowRays,
-    n_shadows: int,
-) -> int:
-    """Add the light of the point lights to a sample, or write the shadow rays that decide about it.
-
-    Args:
-        s: the surface.
-        material: its row of the material table.
-        finish: the material at this place.
-        wr, wg, wb: share of the surface's light that reaches the eye.
-        vx, vy, vz: direction `towards_eye`.
-        sample: camera sample of the block.
-        lights: (l,) LIGHT.
-        radiance: (samples, 3) float32, added to.
-        shadows: shadow rays; room for another l.
-        n_shadows: how many there are.
-
-    Returns:
-        How many there are now.
-    """
+def light_up(surfaces: Surfaces, group: Group, seen: Any, s: Surface, finish: Finish, places: Places) -> None:
+    """Write what the surfaces that a group met send back by themselves and of each point light."""
+    lights, around, materials, written = surfaces.lights, surfaces.surroundings, surfaces.materials, places.light
+    row = choose(seen, s.material, 0)
+    ar, ag, ab = even_light(s, finish, group.dx, group.dy, group.dz)
+    keep_three(
+        written, SENT,
+        group.wr * (entry(materials["emission_red"], row) + ar * around[2, 0]),
+        group.wg * (entry(materials["emission_green"], row) + ag * around[2, 1]),
+        group.wb * (entry(materials["emission_blue"], row) + ab * around[2, 2]),
+    )  # fmt: skip
+    vx, vy, vz = towards_eye(finish.calls, group.dx, group.dy, group.dz)
+    keep_three(places.rows, EYE, vx, vy, vz)
+    lit = finish.calls & LIT != 0
+    if not anywhere(lit):
+        return
+    away = s.offset + s.lift
+    keep_three(written, START, s.px + away * s.gx, s.py + away * s.gy, s.pz + away * s.gz)
     for index in range(len(lights)):
         light = lights[index]
-        red, green, blue, inverse = _light_to_eye(s, material, finish, light, vx, vy, vz)
-        red, green, blue = wr * red, wg * green, wb * blue
-        if not max(red, max(green, blue)) > 0.0:
-            continue
-        reach = 1.0 - OFFSET_ULPS * inverse * max(abs(light.x), max(abs(light.y), abs(light.z)))
-        tx, ty, tz = light.x - s.px, light.y - s.py, light.z - s.pz
-        n_shadows = _send(
-            s, tx, ty, tz, reach if light.casts != 0 else 0.0, red, green, blue, sample, radiance, shadows, n_shadows
-        )
-    return n_shadows
+        dx, dy, dz, reach, shone, red, green, blue = point_light(s, finish, light, vx, vy, vz)
+        red, green, blue = group.wr * red, group.wg * green, group.wb * blue
+        adds = lit & shone & (most(red, most(green, blue)) > 0.0)
+        first = LIGHTS + LIGHT_ROWS * index
+        keep_three(written, first, dx, dy, dz)
+        keep(written, first + 3, choose(adds, choose(light.casts != 0, most(0.0, reach), 0.0), UNLIT))
+        keep_three(written, first + 4, red, green, blue)
 
 
 @formula
-def light_from_areas(
-    s: Surface,
-    material: Any,
-    finish: Finish,
-    wr: float,
-    wg: float,
-    wb: float,
-    vx: float,
-    vy: float,
-    vz: float,
-    sample: int,
-    lights: NDArray[np.void],
-    draws: LightSamples,
-    radiance: NDArray[np.float32],
-    shadows: ShadowRays,
-    n_shadows: int,
-) -> int:
-    """The same as `light_from_points` for lights with a size.
-
-    Args:
-        s, material, finish, wr, wg, wb, vx, vy, vz, sample, radiance, n_shadows: as there.
-        lights: (l,) AREA_LIGHT.
-        draws: the camera samples of the block.
-        shadows: shadow rays; room for another l * draws.each.
-
-    Returns:
-        How many shadow rays there are now.
-    """
-    each = draws.each if draws.depth == 0 else 1
-    for index in range(len(lights)):
-        light = lights[index]
-        if light.reaches == 0:
-            continue
-        view = see_light(light, s.px, s.py, s.pz)
-        if not view.solid_angle > 0.0:
-            continue
-        seed = light_seed(draws.seed[sample], index, draws.depth)
-        for turn in range(each):
-            u, v = light_sample(seed, draws.number[sample] * each + turn)
-            tx, ty, tz, share = towards_light(light, view, s.px, s.py, s.pz, u, v)
-            inverse = 1.0 / math.sqrt(tx * tx + ty * ty + tz * tz)
-            lx, ly, lz = tx * inverse, ty * inverse, tz * inverse
-            cosine = lx * s.nx + ly * s.ny + lz * s.nz
-            if not cosine > 0.0 or _is_behind(material, finish, lx, ly, lz):
-                continue
-            red, green, blue = reflectance(s, material, finish, cosine, lx, ly, lz, vx, vy, vz)
-            share /= each
-            red, green, blue = (
-                wr * red * (light.red * share),
-                wg * green * (light.green * share),
-                wb * blue * (light.blue * share),
-            )
-            if not max(red, max(green, blue)) > 0.0:
-                continue
-            farthest = max(abs(s.px + tx), max(abs(s.py + ty), abs(s.pz + tz)))
-            reach = 1.0 - OFFSET_ULPS * inverse * farthest
-            n_shadows = _send(
-                s, tx, ty, tz, reach if light.casts != 0 else 0.0, red, green, blue,
-                sample, radiance, shadows, n_shadows,
-            )  # fmt: skip
-    return n_shadows
-
-
-@kernel
-def add_unblocked(shadows: ShadowRays, blocked: NDArray[np.uint8], radiance: NDArray[np.float32]) -> None:
-    """Add the light of the shadow rays that reach it to their samples.
-
-    Args:
-        shadows: n shadow rays.
-        blocked: (n,) uint8, 1 where something is in between.
-        radiance: (samples, 3) float32.
-    """
-    light, sample_of = shadows.light, shadows.sample
-    for ray in range(len(blocked)):
-        if blocked[ray] == 0:
-            sample = sample_of[ray]
-            radiance[sample, 0] += light[ray, 0]
-            radiance[sample, 1] += light[ray, 1]
-            radiance[sample, 2] += light[ray, 2]
+def light_beyond(surfaces: Surfaces, group: Group, seen: Any, places: Places) -> None:
+    """Write what the rays see that met no surface: an area light, or between horizon and zenith nothing at all."""
+    around, lamps, written = surfaces.surroundings, surfaces.area_lights, places.light
+    high = least(1.0, most(0.0, group.dy))
+    low = 1.0 - high
+    red = high * around[0, 0] + low * around[1, 0]
+    green = high * around[0, 1] + low * around[1, 1]
+    blue = high * around[0, 2] + low * around[1, 2]
+    solids = len(surfaces.facets) + len(surfaces.spheres.radius)
+    lamp = group.primitive >= solids
+    if anywhere(lamp):
+        k = choose(lamp, group.primitive - solids, 0)
+        red = choose(lamp, entry(lamps["red"], k), red)
+        green = choose(lamp, entry(lamps["green"], k), green)
+        blue = choose(lamp, entry(lamps["blue"], k), blue)
+    keep_three(
+        written, SENT,
+        choose(seen, held(written, SENT), group.wr * red),
+        choose(seen, held(written, SENT + 1), group.wg * green),
+        choose(seen, held(written, SENT + 2), group.wb * blue),
+    )  # fmt: skip

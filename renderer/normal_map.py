@@ -23,6 +23,7 @@ from __future__ import annotations
 import math
 
 from renderer.kernel import formula
+from renderer.lanes import choose, most, root
 from renderer.surface import Surface
 
 
@@ -30,12 +31,11 @@ from renderer.surface import Surface
 def _with_normal(s: Surface, nx: float, ny: float, nz: float) -> Surface:
     """The surface with another shading normal, of any length; one without length leaves it as it is."""
     square = nx * nx + ny * ny + nz * nz
-    if not square > 0.0:
-        return s
-    inverse = 1.0 / math.sqrt(square)
+    known = square > 0.0
+    inverse = 1.0 / root(square)
+    nx, ny, nz = choose(known, nx * inverse, s.nx), choose(known, ny * inverse, s.ny), choose(known, nz * inverse, s.nz)
     return Surface(
-        s.px, s.py, s.pz, s.gx, s.gy, s.gz, nx * inverse, ny * inverse, nz * inverse,
-        s.u, s.v, s.offset, s.lift, s.material, s.entering,
+        s.px, s.py, s.pz, s.gx, s.gy, s.gz, nx, ny, nz, s.u, s.v, s.offset, s.lift, s.material, s.entering
     )  # fmt: skip
 
 
@@ -45,9 +45,13 @@ def _facing(
 ) -> tuple[float, float, float, float]:
     """The normal to pull towards, h or else the face's own, and how much it faces the ray."""
     facing = -(dx * hx + dy * hy + dz * hz)
-    if facing > 0.0:
-        return hx, hy, hz, facing
-    return s.gx, s.gy, s.gz, -(dx * s.gx + dy * s.gy + dz * s.gz)
+    seen = facing > 0.0
+    return (
+        choose(seen, hx, s.gx),
+        choose(seen, hy, s.gy),
+        choose(seen, hz, s.gz),
+        choose(seen, facing, -(dx * s.gx + dy * s.gy + dz * s.gz)),
+    )
 
 
 @formula
@@ -57,19 +61,21 @@ def bumped(
     """The surface with its shading normal n bent by a normal map; it faces the ray.
 
     Args:
-        s: the surface.
+        s: the surface; this and what follows are numbers or lanes.
         tx, ty, tz: unit vector t across n.
         x, y, z: components of the bent normal along t, along n x t, and along n, of any length.
         dx, dy, dz: direction of the ray that met it.
     """
-    z = max(0.0, z)
+    z = most(0.0, z)
     bx = x * tx + y * (s.ny * tz - s.nz * ty) + z * s.nx
     by = x * ty + y * (s.nz * tx - s.nx * tz) + z * s.ny
     bz = x * tz + y * (s.nx * ty - s.ny * tx) + z * s.nz
     toward = -(dx * bx + dy * by + dz * bz)
-    if toward < 0.0:
-        hx, hy, hz, facing = _facing(s, s.nx, s.ny, s.nz, dx, dy, dz)
-        bx, by, bz = facing * bx - toward * hx, facing * by - toward * hy, facing * bz - toward * hz
+    away = toward < 0.0
+    hx, hy, hz, facing = _facing(s, s.nx, s.ny, s.nz, dx, dy, dz)
+    bx = choose(away, facing * bx - toward * hx, bx)
+    by = choose(away, facing * by - toward * hy, by)
+    bz = choose(away, facing * bz - toward * hz, bz)
     return _with_normal(s, bx, by, bz)
 
 

@@ -1,15 +1,16 @@
-"""How much of the light from one direction a surface sends into another, by either base."""
+"""How much of the light from one direction a surface sends into another, by either base.
+
+All of it takes numbers or lanes.
+"""
 
 from __future__ import annotations
 
 import math
-from typing import Any
-
-import numpy as np
 
 from renderer.ashikhmin_shirley import ashikhmin_shirley, matt_share
 from renderer.finish import Finish
 from renderer.kernel import formula
+from renderer.lanes import anywhere, choose, least, most, power, root
 from renderer.material_table import MICROFACETS, SPECULAR
 from renderer.surface import Surface
 
@@ -17,10 +18,13 @@ INVERSE_PI = 1.0 / math.pi
 
 
 @formula
-def phong_lobe(s: Surface, lx: float, ly: float, lz: float, vx: float, vy: float, vz: float, shininess: float) -> float:
+def phong_lobe(
+    shiny: bool, s: Surface, lx: float, ly: float, lz: float, vx: float, vy: float, vz: float, shininess: float
+) -> float:
     """(R.V)^shininess, R the mirror image of the direction to the light; 0 where R faces away from V.
 
     Args:
+        shiny: whether to work it out; else it is 0.
         s: the surface.
         lx, ly, lz: unit direction to the light.
         vx, vy, vz: unit direction to the eye.
@@ -28,31 +32,29 @@ def phong_lobe(s: Surface, lx: float, ly: float, lz: float, vx: float, vy: float
     """
     twice = 2.0 * (s.nx * lx + s.ny * ly + s.nz * lz)
     cosine = (twice * s.nx - lx) * vx + (twice * s.ny - ly) * vy + (twice * s.nz - lz) * vz
-    if not cosine > 0.0:
-        return 0.0
-    return float(min(1.0, cosine) ** shininess)
+    return power(shiny & (cosine > 0.0), least(1.0, cosine), shininess)
 
 
 @formula
-def towards_eye(material: Any, dx: float, dy: float, dz: float) -> tuple[float, float, float]:
+def towards_eye(calls: int, dx: float, dy: float, dz: float) -> tuple[float, float, float]:
     """Direction to the eye, of unit length where the material has a highlight.
 
     A ray's direction is of unit length but for float32 rounding, which a large exponent would turn into a factor.
 
     Args:
-        material: its row of the material table.
+        calls: bits of the material table.
         dx, dy, dz: direction of the ray that met it.
     """
-    if material.calls & (SPECULAR | MICROFACETS) == 0:
-        return -dx, -dy, -dz
-    inverse = 1.0 / math.sqrt(dx * dx + dy * dy + dz * dz)
-    return -dx * inverse, -dy * inverse, -dz * inverse
+    shines = calls & (SPECULAR | MICROFACETS) != 0
+    if anywhere(shines):
+        inverse = choose(shines, 1.0 / root(dx * dx + dy * dy + dz * dz), 1.0)
+        return -dx * inverse, -dy * inverse, -dz * inverse
+    return -dx, -dy, -dz
 
 
 @formula
 def reflectance(
     s: Surface,
-    material: Any,
     finish: Finish,
     cosine: float,
     lx: float,
@@ -66,28 +68,28 @@ def reflectance(
 
     Args:
         s: the surface.
-        material: its row of the material table.
         finish: the material at this place.
-        cosine: of the angle between the light and the shading normal, above 0.
+        cosine: of the angle between the light and the shading normal; where it is not above 0 the result has no
+            meaning.
         lx, ly, lz: unit direction to the light.
         vx, vy, vz: direction `towards_eye`.
     """
-    if material.calls & MICROFACETS != 0:
-        return _microfacets(s, material, finish, lx, ly, lz, vx, vy, vz)
     matt = cosine * INVERSE_PI
     red, green, blue = finish.kr * matt, finish.kg * matt, finish.kb * matt
-    if material.calls & SPECULAR != 0:
-        gloss = phong_lobe(s, lx, ly, lz, vx, vy, vz, material.shininess)
-        red += finish.sr * gloss
-        green += finish.sg * gloss
-        blue += finish.sb * gloss
+    shiny = finish.calls & SPECULAR != 0
+    if anywhere(shiny):
+        gloss = phong_lobe(shiny, s, lx, ly, lz, vx, vy, vz, finish.shininess)
+        red, green, blue = red + finish.sr * gloss, green + finish.sg * gloss, blue + finish.sb * gloss
+    faceted = finish.calls & MICROFACETS != 0
+    if anywhere(faceted):
+        r, g, b = _microfacets(s, finish, lx, ly, lz, vx, vy, vz)
+        red, green, blue = choose(faceted, r, red), choose(faceted, g, green), choose(faceted, b, blue)
     return red, green, blue
 
 
 @formula
 def _microfacets(
     s: Surface,
-    material: Any,
     finish: Finish,
     lx: float,
     ly: float,
@@ -98,10 +100,8 @@ def _microfacets(
 ) -> tuple[float, float, float]:
     """`reflectance` of the base of Ashikhmin and Shirley."""
     gloss, schlick, matt = ashikhmin_shirley(
-        s.nx, s.ny, s.nz, finish.ux, finish.uy, finish.uz,
-        np.float64(material.exponent_u), np.float64(material.exponent_v),
-        lx, ly, lz, vx, vy, vz,
-    )  # fmt: skip
+        s.nx, s.ny, s.nz, finish.ux, finish.uy, finish.uz, finish.nu, finish.nv, lx, ly, lz, vx, vy, vz
+    )
     return (
         gloss * (finish.sr + (1.0 - finish.sr) * schlick) + matt * (1.0 - finish.sr) * finish.kr,
         gloss * (finish.sg + (1.0 - finish.sg) * schlick) + matt * (1.0 - finish.sg) * finish.kg,
@@ -110,9 +110,7 @@ def _microfacets(
 
 
 @formula
-def even_light(
-    s: Surface, material: Any, finish: Finish, dx: float, dy: float, dz: float
-) -> tuple[float, float, float]:
+def even_light(s: Surface, finish: Finish, dx: float, dy: float, dz: float) -> tuple[float, float, float]:
     """Share of a light that comes evenly from everywhere which the surface sends back along a ray.
 
     Phong's diffuse albedo; for Ashikhmin and Shirley the integral of the diffuse term, and for the highlight
@@ -120,15 +118,15 @@ def even_light(
 
     Args:
         s: the surface.
-        material: its row of the material table.
         finish: the material at this place.
         dx, dy, dz: unit direction of the ray that met it.
     """
-    if material.calls & MICROFACETS == 0:
+    faceted = finish.calls & MICROFACETS != 0
+    if not anywhere(faceted):
         return finish.kr, finish.kg, finish.kb
-    matt = matt_share(max(0.0, -(s.nx * dx + s.ny * dy + s.nz * dz)))
+    matt = matt_share(most(0.0, -(s.nx * dx + s.ny * dy + s.nz * dz)))
     return (
-        finish.sr + (1.0 - finish.sr) * finish.kr * matt,
-        finish.sg + (1.0 - finish.sg) * finish.kg * matt,
-        finish.sb + (1.0 - finish.sb) * finish.kb * matt,
+        choose(faceted, finish.sr + (1.0 - finish.sr) * finish.kr * matt, finish.kr),
+        choose(faceted, finish.sg + (1.0 - finish.sg) * finish.kg * matt, finish.kg),
+        choose(faceted, finish.sb + (1.0 - finish.sb) * finish.kb * matt, finish.kb),
     )

@@ -13,8 +13,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.gather import octet
 from renderer.kernel import formula
-from renderer.prepared import MATERIAL_COLUMN, NORMAL_COLUMN, REACH_COLUMN, SMOOTH_COLUMN
+from renderer.lanes import anywhere, choose, least, most, root, whole
+from renderer.prepared import MATERIAL_COLUMN
 from renderer.sphere import SphereTree, hit_distance
 
 OFFSET_ULPS = 16.0 * 2.0**-23
@@ -64,7 +66,7 @@ def _farther(a: float, b: float, c: float, limit: float) -> float:
 @formula
 def _lift(px: float, py: float, pz: float, cx: float, cy: float, cz: float, nx: float, ny: float, nz: float) -> float:
     """How far below the plane of a corner's normal the point lies, 0 if above (Hanika 2021, ch. 4)."""
-    return min(0.0, (px - cx) * nx + (py - cy) * ny + (pz - cz) * nz)
+    return least(0.0, (px - cx) * nx + (py - cy) * ny + (pz - cz) * nz)
 
 
 @formula
@@ -75,22 +77,25 @@ def weights_at(
 
     In float64 from the ray and the corners alone (Moller and Trumbore 1997), so that they do not depend on how
     the search found the triangle; cut off at its edges, which Embree's robust mode reaches a little beyond.
+    Takes numbers or lanes.
     """
-    ax, ay, az = np.float64(f[t, 0]), np.float64(f[t, 1]), np.float64(f[t, 2])
-    bx, by, bz = f[t, 8] - ax, f[t, 9] - ay, f[t, 10] - az
-    cx, cy, cz = f[t, 16] - ax, f[t, 17] - ay, f[t, 18] - az
+    ax, ay, az, _, _, _, _, _ = octet(f, t, 0)
+    bx, by, bz, _, _, _, _, _ = octet(f, t, 8)
+    cx, cy, cz, _, _, _, _, _ = octet(f, t, 16)
+    bx, by, bz = bx - ax, by - ay, bz - az
+    cx, cy, cz = cx - ax, cy - ay, cz - az
     hx, hy, hz = dy * cz - dz * cy, dz * cx - dx * cz, dx * cy - dy * cx
     volume = bx * hx + by * hy + bz * hz
-    if volume == 0.0:
-        return 0.0, 0.0
     sx, sy, sz = ox - ax, oy - ay, oz - az
     qx, qy, qz = sy * bz - sz * by, sz * bx - sx * bz, sx * by - sy * bx
     inverse = 1.0 / volume
-    b1 = min(1.0, max(0.0, (sx * hx + sy * hy + sz * hz) * inverse))
-    b2 = min(1.0, max(0.0, (dx * qx + dy * qy + dz * qz) * inverse))
-    if b1 + b2 > 1.0:
-        inverse = 1.0 / (b1 + b2)
-        return b1 * inverse, b2 * inverse
+    flat = volume == 0.0
+    b1 = choose(flat, 0.0, least(1.0, most(0.0, (sx * hx + sy * hy + sz * hz) * inverse)))
+    b2 = choose(flat, 0.0, least(1.0, most(0.0, (dx * qx + dy * qy + dz * qz) * inverse)))
+    beyond = b1 + b2 > 1.0
+    if anywhere(beyond):
+        inverse = choose(beyond, 1.0 / (b1 + b2), 1.0)
+        b1, b2 = b1 * inverse, b2 * inverse
     return b1, b2
 
 
@@ -100,45 +105,41 @@ def triangle_surface(f: NDArray[np.float32], t: int, b1: float, b2: float, dx: f
 
     The shadow origin of a smooth triangle is lifted to the height of the curved surface its normals
     suggest, which removes the black triangles at the shadow terminator (Hanika, Ray Tracing Gems II, 2021,
-    ch. 4); straight up, so that wild normals do not carry it through a neighbouring wall.
+    ch. 4); straight up, so that wild normals do not carry it through a neighbouring wall. Takes numbers or lanes.
     """
     b0 = 1.0 - b1 - b2
-    ax, ay, az = np.float64(f[t, 0]), np.float64(f[t, 1]), np.float64(f[t, 2])
-    bx, by, bz = np.float64(f[t, 8]), np.float64(f[t, 9]), np.float64(f[t, 10])
-    cx, cy, cz = np.float64(f[t, 16]), np.float64(f[t, 17]), np.float64(f[t, 18])
+    ax, ay, az, n0x, n0y, n0z, u0, v0 = octet(f, t, 0)
+    bx, by, bz, n1x, n1y, n1z, u1, v1 = octet(f, t, 8)
+    cx, cy, cz, n2x, n2y, n2z, u2, v2 = octet(f, t, 16)
+    material, smooth, gx, gy, gz, reach, _, _ = octet(f, t, MATERIAL_COLUMN)
     px, py, pz = b0 * ax + b1 * bx + b2 * cx, b0 * ay + b1 * by + b2 * cy, b0 * az + b1 * bz + b2 * cz
-    gx, gy, gz = (
-        np.float64(f[t, NORMAL_COLUMN]),
-        np.float64(f[t, NORMAL_COLUMN + 1]),
-        np.float64(f[t, NORMAL_COLUMN + 2]),
-    )
-    entering = bool(gx * dx + gy * dy + gz * dz <= 0.0)
-    face = 1.0 if entering else -1.0
+    entering = gx * dx + gy * dy + gz * dz <= 0.0
+    face = choose(entering, 1.0, -1.0)
     gx, gy, gz = gx * face, gy * face, gz * face
     nx, ny, nz = gx, gy, gz
-    lift = 0.0
-    if f[t, SMOOTH_COLUMN] != 0.0:
-        n0x, n0y, n0z = np.float64(f[t, 3]), np.float64(f[t, 4]), np.float64(f[t, 5])
-        n1x, n1y, n1z = np.float64(f[t, 11]), np.float64(f[t, 12]), np.float64(f[t, 13])
-        n2x, n2y, n2z = np.float64(f[t, 19]), np.float64(f[t, 20]), np.float64(f[t, 21])
+    smoothed = smooth != 0.0
+    lift = choose(smoothed, 0.0, 0.0)
+    if anywhere(smoothed):
         sx, sy, sz = b0 * n0x + b1 * n1x + b2 * n2x, b0 * n0y + b1 * n1y + b2 * n2y, b0 * n0z + b1 * n1z + b2 * n2z
-        length = math.sqrt(sx * sx + sy * sy + sz * sz)
-        side = 1.0 if sx * gx + sy * gy + sz * gz >= 0.0 else -1.0
-        if length > 0.0:
-            inverse = side / length
-            nx, ny, nz = sx * inverse, sy * inverse, sz * inverse
+        length = root(sx * sx + sy * sy + sz * sz)
+        side = choose(sx * gx + sy * gy + sz * gz >= 0.0, 1.0, -1.0)
+        inverse = side / length
+        known = smoothed & (length > 0.0)
+        nx, ny, nz = choose(known, sx * inverse, nx), choose(known, sy * inverse, ny), choose(known, sz * inverse, nz)
         n0x, n0y, n0z, n1x, n1y, n1z = side * n0x, side * n0y, side * n0z, side * n1x, side * n1y, side * n1z
         n2x, n2y, n2z = side * n2x, side * n2y, side * n2z
         d0 = b0 * _lift(px, py, pz, ax, ay, az, n0x, n0y, n0z)
         d1 = b1 * _lift(px, py, pz, bx, by, bz, n1x, n1y, n1z)
         d2 = b2 * _lift(px, py, pz, cx, cy, cz, n2x, n2y, n2z)
-        lift = -d0 * max(0.0, n0x * gx + n0y * gy + n0z * gz)
-        lift -= d1 * max(0.0, n1x * gx + n1y * gy + n1z * gz)
-        lift -= d2 * max(0.0, n2x * gx + n2y * gy + n2z * gz)
-    u = b0 * f[t, 6] + b1 * f[t, 14] + b2 * f[t, 22]
-    v = b0 * f[t, 7] + b1 * f[t, 15] + b2 * f[t, 23]
-    material = int(f[t, MATERIAL_COLUMN])
-    return Surface(px, py, pz, gx, gy, gz, nx, ny, nz, u, v, f[t, REACH_COLUMN] * OFFSET_ULPS, lift, material, entering)
+        up = -d0 * most(0.0, n0x * gx + n0y * gy + n0z * gz)
+        up = up - d1 * most(0.0, n1x * gx + n1y * gy + n1z * gz)
+        up = up - d2 * most(0.0, n2x * gx + n2y * gy + n2z * gz)
+        lift = choose(smoothed, up, 0.0)
+    u = b0 * u0 + b1 * u1 + b2 * u2
+    v = b0 * v0 + b1 * v1 + b2 * v2
+    return Surface(
+        px, py, pz, gx, gy, gz, nx, ny, nz, u, v, reach * OFFSET_ULPS, lift, whole(material), entering
+    )  # fmt: skip
 
 
 @formula

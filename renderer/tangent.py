@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from renderer.direction import unit
 from renderer.kernel import formula
+from renderer.lanes import choose
 from renderer.scene import Mesh
 
 TANGENT = 10
@@ -62,12 +63,9 @@ def mesh_tangents(mesh: Mesh) -> NDArray[np.float64]:
 
 @formula
 def tangent_of_normal(nx: float, ny: float, nz: float) -> tuple[float, float, float]:
-    """A vector across a unit normal, continuous but for the normal (0, -1, 0); see above."""
-    if ny >= 0.0:
-        shrink = 1.0 / (1.0 + ny)
-    else:
-        across = nx * nx + nz * nz
-        if not across > 0.0:
-            return 0.0, 0.0, 1.0
-        shrink = (1.0 - ny) / across
-    return -nz * nx * shrink, -nz, 1.0 - nz * nz * shrink
+    """A vector across a unit normal, continuous but for the normal (0, -1, 0); see above. Takes numbers or lanes."""
+    across = nx * nx + nz * nz
+    up = ny >= 0.0
+    shrink = choose(up, 1.0, 1.0 - ny) / choose(up, 1.0 + ny, across)
+    known = up | (across > 0.0)
+    return choose(known, -nz * nx * shrink, 0.0), choose(known, -nz, 0.0), choose(known, 1.0 - nz * nz * shrink, 1.0)

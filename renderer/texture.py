@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.gather import entry
 from renderer.kernel import formula
+from renderer.lanes import anywhere, binary_logarithm, choose, floor, least, most, whole
 
 REPEAT, CLAMP, MIRROR = 0, 1, 2
 """Rows of `renderer.scene.WRAPS`."""
@@ -28,10 +28,8 @@ def wrap(coordinate: float) -> float:
 
     A tiny negative coordinate would round up to 1 and leave the picture; it belongs to its last texel.
     """
-    part = coordinate - np.floor(coordinate)
-    if part >= 1.0:
-        return 1.0 - 2.0**-53
-    return part if part >= 0.0 else 0.0
+    part = coordinate - floor(coordinate)
+    return choose(part >= 1.0, 1.0 - 2.0**-53, choose(part >= 0.0, part, 0.0))
 
 
 @formula
@@ -39,15 +37,13 @@ def within(coordinate: float, mode: int) -> float:
     """Where in a picture, 0 to 1, a texture coordinate lies; 0 for one that is not a number.
 
     Args:
-        coordinate: any.
+        coordinate: any; numbers or lanes.
         mode: REPEAT, CLAMP or MIRROR, which runs every second repeat backwards.
     """
-    if mode == REPEAT:
-        return wrap(coordinate)
-    if mode == CLAMP:
-        return min(1.0, coordinate) if coordinate > 0.0 else 0.0
-    part = 2.0 * wrap(0.5 * coordinate)
-    return 2.0 - part if part > 1.0 else part
+    part = wrap(choose(mode == MIRROR, 0.5 * coordinate, coordinate))
+    there_and_back = choose(part > 0.5, 2.0 - 2.0 * part, 2.0 * part)
+    clamped = choose(coordinate > 0.0, least(1.0, coordinate), 0.0)
+    return choose(mode == REPEAT, part, choose(mode == CLAMP, clamped, there_and_back))
 
 
 @formula
@@ -55,21 +51,28 @@ def neighbours(position: float, length: int, mode: int) -> tuple[int, int, float
     """The two texels around a position along one axis, and the share of the second.
 
     Args:
-        position: in texels, 0 to `length`.
+        position: in texels, 0 to `length`; numbers or lanes.
         length: of the picture.
         mode: REPEAT, CLAMP or MIRROR.
     """
-    floor = np.floor(position - 0.5)
-    share = position - 0.5 - floor
-    first = int(floor)
+    before = floor(position - 0.5)
+    first = whole(before)
     second = first + 1
-    if first < 0:
-        first = length - 1 if mode == REPEAT else 0
-    elif first >= length:
-        first = 0 if mode == REPEAT else length - 1
-    if second >= length:
-        second = 0 if mode == REPEAT else length - 1
-    return first, second, share
+    last = length - 1
+    past_end = choose(mode == REPEAT, 0, last)
+    first = choose(first < 0, choose(mode == REPEAT, last, 0), choose(first > last, past_end, first))
+    second = choose(second > last, past_end, second)
+    return first, second, position - 0.5 - before
+
+
+@formula
+def _mixed(
+    decoded: NDArray[np.float64], shift: int, a: int, b: int, c: int, d: int, wa: float, wb: float, wc: float, wd: float
+) -> float:
+    """The weighted sum of one channel of four texels."""
+    upper = wa * entry(decoded, a >> shift & 255) + wb * entry(decoded, b >> shift & 255)
+    mixed: float = upper + wc * entry(decoded, c >> shift & 255) + wd * entry(decoded, d >> shift & 255)
+    return mixed
 
 
 @formula
@@ -87,24 +90,22 @@ def look_up(
 
     Args:
         texels, linear, pictures: of the atlas.
-        row: of the level among `pictures`.
+        row: of the level among `pictures`; this and what follows are numbers or lanes.
         across, down: share of its width and height, 0 to 1, from its upper left.
         wrap_u, wrap_v: REPEAT, CLAMP or MIRROR.
     """
-    picture = pictures[row]
-    width, height = picture.width, picture.height
+    start, width, height = entry(pictures["start"], row), entry(pictures["width"], row), entry(pictures["height"], row)
     left, right, fx = neighbours(across * width, width, wrap_u)
     top, bottom, fy = neighbours(down * height, height, wrap_v)
-    upper, lower = picture.start + top * width, picture.start + bottom * width
-    a, b = texels[upper + left], texels[upper + right]
-    c, d = texels[lower + left], texels[lower + right]
+    upper, lower = start + top * width, start + bottom * width
+    a, b = entry(texels, upper + left), entry(texels, upper + right)
+    c, d = entry(texels, lower + left), entry(texels, lower + right)
     wa, wb, wc, wd = (1 - fx) * (1 - fy), fx * (1 - fy), (1 - fx) * fy, fx * fy
-    red = wa * linear[a & 255] + wb * linear[b & 255] + wc * linear[c & 255] + wd * linear[d & 255]
-    a, b, c, d = a >> 8, b >> 8, c >> 8, d >> 8
-    green = wa * linear[a & 255] + wb * linear[b & 255] + wc * linear[c & 255] + wd * linear[d & 255]
-    a, b, c, d = a >> 8, b >> 8, c >> 8, d >> 8
-    blue = wa * linear[a & 255] + wb * linear[b & 255] + wc * linear[c & 255] + wd * linear[d & 255]
-    return red, green, blue
+    return (
+        _mixed(linear, 0, a, b, c, d, wa, wb, wc, wd),
+        _mixed(linear, 8, a, b, c, d, wa, wb, wc, wd),
+        _mixed(linear, 16, a, b, c, d, wa, wb, wc, wd),
+    )
 
 
 @formula
@@ -130,13 +131,12 @@ def level_of(area: float, texels: float) -> float:
     """Level of a picture whose texels are about as large as a footprint; 0 or less where they are larger.
 
     Args:
-        area: of the footprint in texture coordinates; NaN counts as 0.
+        area: of the footprint in texture coordinates; one that is not a number counts as 0. Numbers or lanes.
         texels: of the picture's largest level.
     """
     covered = area * texels
-    if not covered > 1.0:
-        return 0.0
-    return 0.5 * math.log2(covered) - SHARPNESS
+    small = covered > 1.0
+    return choose(small, 0.5 * binary_logarithm(choose(small, covered, 1.0)) - SHARPNESS, 0.0)
 
 
 @formula
@@ -153,17 +153,20 @@ def filtered(
 
     Args:
         texels, linear, pictures: of the atlas; its `signed` in place of `linear` for a normal map.
-        row: of the picture's largest level.
+        row: of the picture's largest level; this and what follows are numbers or lanes.
         area: of the footprint in texture coordinates.
+        u, v: texture coordinates.
     """
-    picture = pictures[row]
-    wrap_u, wrap_v = picture.wrap_u, picture.wrap_v
+    wrap_u, wrap_v = entry(pictures["wrap_u"], row), entry(pictures["wrap_v"], row)
     across, down = within(u, wrap_u), 1.0 - within(v, wrap_v)
-    level = min(level_of(area, picture.texels), picture.levels - 1.0)
-    whole = int(max(0.0, level))
-    red, green, blue = look_up(texels, linear, pictures, row + whole, across, down, wrap_u, wrap_v)
-    share = level - whole
-    if not share > 0.0:
-        return red, green, blue
-    r, g, b = look_up(texels, linear, pictures, row + whole + 1, across, down, wrap_u, wrap_v)
-    return red + share * (r - red), green + share * (g - green), blue + share * (b - blue)
+    level = least(level_of(area, entry(pictures["texels"], row)), entry(pictures["levels"], row) - 1.0)
+    larger = whole(most(0.0, level))
+    red, green, blue = look_up(texels, linear, pictures, row + larger, across, down, wrap_u, wrap_v)
+    share = level - larger
+    between = share > 0.0
+    if anywhere(between):
+        smaller = row + larger + choose(between, 1, 0)
+        r, g, b = look_up(texels, linear, pictures, smaller, across, down, wrap_u, wrap_v)
+        share = choose(between, share, 0.0)
+        red, green, blue = red + share * (r - red), green + share * (g - green), blue + share * (b - blue)
+    return red, green, blue

@@ -13,13 +13,15 @@ from renderer.cutout import cast_through, pass_holes
 from renderer.display import Display
 from renderer.frame import RayCounts
 from renderer.light_samples import LightSamples, seed_samples
-from renderer.lighting import add_unblocked
 from renderer.nested import media_at, pass_hidden
+from renderer.places import make_places
 from renderer.prepared import PreparedScene
 from renderer.quality import Quality
 from renderer.rays import Rays, first_shadow_rays, make_rays, make_shadow_rays, some_rays
 from renderer.sampling import camera_rays, lattice_order, lattice_step
-from renderer.shading import CHILDREN, COUNTERS, REFLECTIONS, REFRACTIONS, SHADOWS, shade
+from renderer.shading import shade
+from renderer.shadow_rays import add_unblocked
+from renderer.spawning import CHILDREN, COUNTERS, REFLECTIONS, REFRACTIONS, SHADOWS
 from renderer.tonemap import SMALLEST_STEP
 
 BLOCK_RAYS = 8192
@@ -66,9 +68,11 @@ class Cells(NamedTuple):
 class _Scratch:
     """Room for the rays of a block, level by level; one per thread, kept between blocks."""
 
-    def __init__(self, capacity: int, shadow_rays: int) -> None:
+    def __init__(self, capacity: int, shadow_rays: int, lights: int) -> None:
         self.capacity = capacity
         self.shadow_rays = shadow_rays
+        self.lights = lights
+        self.places = make_places(lights)
         self.levels = [make_rays(2 * capacity)]
         self.shadows = make_shadow_rays(shadow_rays)
         self.counters = np.zeros(COUNTERS, dtype=np.int64)
@@ -128,7 +132,8 @@ def trace_cells(
     """
     n = int((cells.until - cells.first).sum())
     block = block_rays(prepared, quality)
-    scratch = _scratch(max(block, n), block * _most_shadow_rays(prepared, quality))
+    lights = len(prepared.surfaces.lights)
+    scratch = _scratch(max(block, n), block * _most_shadow_rays(prepared, quality), lights)
     points = quality.samples_per_cell
     step = lattice_step(points) if quality.antialiasing == "regular" else 0
     camera_rays(
@@ -144,13 +149,13 @@ def trace_cells(
     return radiance, counts
 
 
-def _scratch(capacity: int, shadow_rays: int) -> _Scratch:
-    """This thread's scratch, with room for `capacity` rays a level and `shadow_rays`; it never shrinks."""
+def _scratch(capacity: int, shadow_rays: int, lights: int) -> _Scratch:
+    """This thread's scratch, with room for `capacity` rays a level, `shadow_rays`, `lights`; it never shrinks."""
     held: _Scratch | None = getattr(_local, "scratch", None)
     if held is None:
-        held = _Scratch(capacity, shadow_rays)
-    elif held.capacity < capacity or held.shadow_rays < shadow_rays:
-        held = _Scratch(max(capacity, held.capacity), max(shadow_rays, held.shadow_rays))
+        held = _Scratch(capacity, shadow_rays, lights)
+    elif held.capacity < capacity or held.shadow_rays < shadow_rays or held.lights < lights:
+        held = _Scratch(max(capacity, held.capacity), max(shadow_rays, held.shadow_rays), max(lights, held.lights))
     _local.scratch = held
     return held
 
@@ -222,7 +227,8 @@ def _shade_batch(
     counters = scratch.counters
     children = scratch.level(draws.depth + 1)
     shade(
-        prepared.surfaces, batch, hits, spawn, cutoff, draws, children, scratch.shadows, radiance, counters
+        prepared.surfaces, batch, hits, spawn, cutoff, draws, scratch.places, children, scratch.shadows, radiance,
+        counters,
     )  # fmt: skip
     pending = int(counters[SHADOWS])
     if pending:

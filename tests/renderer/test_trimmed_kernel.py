@@ -10,14 +10,13 @@ import inspect
 import statistics
 import textwrap
 import time
-from collections.abc import Callable
 from typing import Any
 
 import numba
 import numpy as np
 import pytest
 
-from renderer import lighting, reflectance, shading, whitted
+from renderer import finishing, lighting, material_table, reflectance, shading, shadow_rays, spawning, whitted
 from renderer.display import Display
 from renderer.frame import FrameRequest
 from renderer.gaze import Gaze
@@ -32,8 +31,8 @@ MOST_OVERHEAD = 1.08
 as much as two runs of the same kernel differ."""
 
 TESTS_OF_EFFECTS = {
-    "textures": ("material.picture >= 0", "material.specular_picture >= 0"),
-    "specular": ("material.calls & SPECULAR != 0",),
+    "textures": ("anywhere((picture >= 0) | (specular_picture >= 0) | (normal_picture >= 0))",),
+    "specular": ("anywhere(shiny)",),
     "reflection": ("material.calls & MIRROR != 0",),
     "refraction": ("material.calls & REFRACTS != 0",),
 }
@@ -68,30 +67,28 @@ def trimmed_shade(prepared: PreparedScene) -> Any:
     never = [test for effect, tests in TESTS_OF_EFFECTS.items() if effect not in called for test in tests]
     never += NEVER_FORCED
     bits = np.bitwise_or.reduce(prepared.surfaces.materials["calls"])
-    for name in ("BOUNDARY", "GRAINED", "SPAWNS"):
-        if not bits & getattr(shading, name):
-            never += [f"material.calls & {name} != 0", f"material.calls & ({name} | REFRACTS_ANYWAY) != 0"]
-    if not bits & shading.SPAWNS:
-        never.append("not spawn or material.calls & SPAWNS == 0")
-    if not bits & reflectance.MICROFACETS:
-        never.append("material.calls & MICROFACETS != 0")
+    if not bits & material_table.BOUNDARY:
+        never.append("material.calls & (BOUNDARY | REFRACTS_ANYWAY) != 0")
+    if not bits & material_table.GRAINED:
+        never.append("anywhere(calls & GRAINED != 0)")
+    if not bits & material_table.SPAWNS:
+        never.append("spawn and calls & SPAWNS != 0")
+    if not bits & material_table.MICROFACETS:
+        never.append("anywhere(faceted)")
     if len(prepared.surfaces.indices) == 1:
         never += ["len(indices) > 1", "material.medium > 0"]
-    response = trimmed(reflectance.reflectance, never, {})
-    to_eye = trimmed(lighting._light_to_eye, never, {"reflectance": response})
-    from_points = trimmed(lighting.light_from_points, never, {"_light_to_eye": to_eye})
-    from_areas: Callable[..., int] = trimmed(lighting.light_from_areas, never, {"reflectance": response})
     if not len(prepared.surfaces.area_lights):
-        from_areas = numba.njit(nothing_more)
-    return trimmed(shading.shade, never, {"light_from_points": from_points, "light_from_areas": from_areas})
-
-
-def nothing_more(
-    s: Any, material: Any, finish: Any, wr: Any, wg: Any, wb: Any, dx: Any, dy: Any, dz: Any, sample: Any, lights: Any,
-    draws: Any, radiance: Any, shadows: Any, n_shadows: Any,
-) -> Any:  # fmt: skip
-    """The light of no area light."""
-    return n_shadows
+        never.append("area_lights > 0")
+    response = trimmed(reflectance.reflectance, never, {})
+    evenly = trimmed(reflectance.even_light, never, {})
+    from_point = trimmed(lighting.point_light, never, {"reflectance": response})
+    changed = {
+        "finish_off": trimmed(finishing.finish_off, never, {}),
+        "light_up": trimmed(lighting.light_up, never, {"point_light": from_point, "even_light": evenly}),
+        "ask_area_lights": trimmed(shadow_rays.ask_area_lights, never, {"reflectance": response}),
+        "spawn_rays": trimmed(spawning.spawn_rays, never, {}),
+    }
+    return trimmed(shading.shade, never, changed)
 
 
 @pytest.mark.bench

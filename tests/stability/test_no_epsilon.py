@@ -9,10 +9,11 @@ from pathlib import Path
 import renderer
 
 GEOMETRY = (
-    "area_light", "ashikhmin_shirley", "camera", "cutout", "direction", "embree", "footprint", "fresnel", "grain",
-    "intersection", "light_reach", "light_samples", "lighting", "media", "nested", "normal_map", "packets",
-    "placement", "polygon", "prepared", "rays", "reflectance", "sampling", "shading", "shared_face", "sphere",
-    "surface", "tangent", "whitted",
+    "area_light", "ashikhmin_shirley", "camera", "cutout", "direction", "embree", "finishing", "footprint",
+    "fresnel", "gather", "grain", "group", "intersection", "lanes", "light_reach", "light_samples", "lighting",
+    "media", "nested", "normal_map", "packets", "placement", "places", "polygon", "prepared", "rays",
+    "reflectance", "sampling", "shading", "shadow_rays", "shared_face", "spawning", "sphere", "surface",
+    "tangent", "whitted",
 )  # fmt: skip
 """Modules of the renderer that rays and the surfaces they meet pass through."""
 

@@ -1,0 +1,174 @@
+"""Lanes: each of them what the number alone would be, bit for bit."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from renderer.gather import OCTET, entry, held, keep, lane_numbers, octet, pick
+from renderer.kernel import kernel
+from renderer.lanes import (
+    LANES,
+    anywhere,
+    binary_logarithm,
+    choose,
+    exponential,
+    floor,
+    least,
+    logarithm_beside_one,
+    most,
+    natural_logarithm,
+    power,
+    root,
+    size,
+    whole,
+)
+from renderer.prepared import FACET
+from renderer.surface import triangle_surface, weights_at
+
+ROWS = 32
+numbers = st.lists(st.floats(-1e6, 1e6) | st.sampled_from([0.0, -0.0, math.inf, -math.inf, math.nan, 1e-300]),
+                   min_size=LANES, max_size=LANES).map(np.array)  # fmt: skip
+
+
+@kernel
+def arithmetic_in_lanes(x: NDArray[np.float64], y: NDArray[np.float64], out: NDArray[np.float64]) -> None:
+    lane = lane_numbers(0)
+    a, b = entry(x, lane), entry(y, lane)
+    keep(out, 0, a + b * 2 - 1.0)
+    keep(out, 1, -a / b)
+    keep(out, 2, (a < b) | (a >= 2.0) & (b != 0.0))
+    keep(out, 3, choose(a <= b, a, 3))
+    keep(out, 4, least(a, b))
+    keep(out, 5, most(a, 0.0))
+    keep(out, 6, root(size(a)))
+    keep(out, 7, floor(a))
+    keep(out, 8, whole(choose(size(a) < 1e9, a, 0.0)))
+    keep(out, 9, power(a > 0.0, a, b))
+    keep(out, 10, exponential(a < 1.0, a))
+    keep(out, 11, natural_logarithm(a > 0.0, a))
+    keep(out, 12, logarithm_beside_one(a > 0.0, a))
+    keep(out, 13, binary_logarithm(size(a) + 1.0))
+    keep(out, 14, (lane * 5 >> 1) & 6)
+    keep(out, 15, choose(anywhere(a > b), 1.0, 0.0))
+    keep(out, 16, held(out, 4) == held(out, 5))
+
+
+@kernel
+def arithmetic_of_numbers(x: NDArray[np.float64], y: NDArray[np.float64], out: NDArray[np.float64]) -> None:
+    greater = False
+    for lane in range(len(x)):
+        greater |= x[lane] > y[lane]
+    for lane in range(len(x)):
+        a, b = x[lane], y[lane]
+        out[0, lane] = a + b * 2 - 1.0
+        out[1, lane] = -a / b
+        out[2, lane] = 1.0 if a < b or (a >= 2.0 and b != 0.0) else 0.0
+        out[3, lane] = a if a <= b else 3
+        out[4, lane] = min(a, b)
+        out[5, lane] = max(a, 0.0)
+        out[6, lane] = math.sqrt(abs(a))
+        out[7, lane] = np.floor(a)
+        out[8, lane] = int(a) if abs(a) < 1e9 else 0
+        out[9, lane] = a**b if a > 0.0 else 0.0
+        out[10, lane] = math.exp(a) if a < 1.0 else 0.0
+        out[11, lane] = math.log(a) if a > 0.0 else 0.0
+        out[12, lane] = math.log1p(a) if a > 0.0 else 0.0
+        out[13, lane] = binary_logarithm(abs(a) + 1.0)
+        out[14, lane] = (lane * 5 >> 1) & 6
+        out[15, lane] = 1.0 if greater else 0.0
+        out[16, lane] = 1.0 if out[4, lane] == out[5, lane] else 0.0
+
+
+@given(numbers, numbers)
+def test_every_operation_is_that_of_numbers(x: NDArray[np.float64], y: NDArray[np.float64]) -> None:
+    lanes, alone = np.zeros((ROWS, LANES)), np.zeros((ROWS, LANES))
+    arithmetic_in_lanes(x, y, lanes)
+    arithmetic_of_numbers(x, y, alone)
+    np.testing.assert_array_equal(lanes, alone)
+
+
+@given(st.floats(2.0**-1022, 1e308))
+def test_the_binary_logarithm_is_that_of_the_library(x: float) -> None:
+    assert binary_logarithm(x) == pytest.approx(math.log2(x), abs=2e-12 + abs(math.log2(x)) * 2.0**-52)
+
+
+def test_the_binary_logarithm_of_powers_of_two_is_whole() -> None:
+    assert [binary_logarithm(2.0**k) for k in range(-1022, 1024)] == list(range(-1022, 1024))
+    assert binary_logarithm(math.inf) == 1024
+
+
+@kernel
+def gathered(table: Any, column: Any, places: Any, out: Any) -> None:
+    row = entry(places, lane_numbers(0))
+    keep(out, 0, entry(column, row))
+    keep(out, 1, pick(table, row, 3))
+    eight = octet(table, row, 2)
+    for k in range(OCTET):
+        keep(out, 2 + k, eight[k])
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64, np.int32, np.uint32, np.uint8, np.int64])
+def test_numbers_come_from_their_places(dtype: type) -> None:
+    """Of columns of records too, whose numbers lie on odd addresses."""
+    draw = np.random.default_rng(5)
+    table = draw.normal(size=(40, 13)).astype(np.float32)
+    records = np.zeros(40, dtype=[("odd", np.uint8), ("number", dtype)])
+    records["number"] = draw.integers(0, 255, 40)
+    if np.issubdtype(dtype, np.signedinteger):
+        records["number"] -= 128
+    places = draw.integers(0, 40, LANES).astype(np.int32)
+    out = np.zeros((ROWS, LANES))
+    gathered(table, records["number"], places, out)
+    np.testing.assert_array_equal(out[0], records["number"][places])
+    np.testing.assert_array_equal(out[1], table[places, 3])
+    np.testing.assert_array_equal(out[2 : 2 + OCTET], table[places, 2 : 2 + OCTET].T)
+
+
+@kernel
+def met_in_lanes(f: Any, rays: Any, out: Any) -> None:
+    t = lane_numbers(0)
+    ox, oy, oz, dx, dy, dz, _, _ = octet(rays, t, 0)
+    b1, b2 = weights_at(f, t, ox, oy, oz, dx, dy, dz)
+    s = triangle_surface(f, t, b1, b2, dx, dy, dz)
+    for row, part in enumerate(
+        (b1, b2, s.px, s.py, s.pz, s.gx, s.gy, s.gz, s.nx, s.ny, s.nz, s.u, s.v, s.offset, s.lift)
+    ):
+        keep(out, row, part)
+    keep(out, 15, s.material)
+    keep(out, 16, s.entering)
+
+
+@kernel
+def met_alone(f: Any, rays: Any, out: Any) -> None:
+    for t in range(len(rays)):
+        ox, oy, oz, dx, dy, dz, _, _ = octet(rays, t, 0)
+        b1, b2 = weights_at(f, t, ox, oy, oz, dx, dy, dz)
+        s = triangle_surface(f, t, b1, b2, dx, dy, dz)
+        for row, part in enumerate(
+            (b1, b2, s.px, s.py, s.pz, s.gx, s.gy, s.gz, s.nx, s.ny, s.nz, s.u, s.v, s.offset, s.lift)
+        ):
+            out[row, t] = part
+        out[15, t] = s.material
+        out[16, t] = 1.0 if s.entering else 0.0
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_surfaces_in_lanes_are_those_alone(seed: int) -> None:
+    """Smooth and flat triangles, some without area, and rays that pass beside them."""
+    draw = np.random.default_rng(seed)
+    facets = draw.normal(size=(LANES, FACET)).astype(np.float32)
+    facets[:, 24] = draw.integers(0, 9, LANES)
+    facets[:, 25] = draw.integers(0, 2, LANES)
+    facets[0, 8:11] = facets[0, 0:3]
+    rays = draw.normal(size=(LANES, OCTET)).astype(np.float32)
+    lanes, alone = np.zeros((ROWS, LANES)), np.zeros((ROWS, LANES))
+    met_in_lanes(facets, rays, lanes)
+    met_alone(facets, rays, alone)
+    np.testing.assert_array_equal(lanes, alone)
