@@ -78,21 +78,24 @@ class Benchmark:
     figures: tuple[Figure, ...]
 
 
-class _RecordingIntersector:
+class RecordingIntersector:
     """Answers like the intersector it stands for, and keeps the rays it was asked about."""
 
     def __init__(self, intersector: Intersector) -> None:
+        """Record what `intersector` is asked."""
         self._intersector = intersector
         self.nearest_rays: list[tuple[NDArray[np.float32], NDArray[np.float32]]] = []
         self.shadow_rays: list[tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]] = []
 
     def nearest(self, origin: NDArray[np.float32], direction: NDArray[np.float32]) -> Hits:
+        """As `Intersector.nearest`."""
         self.nearest_rays.append((origin.copy(), direction.copy()))
         return self._intersector.nearest(origin, direction)
 
     def occluded(
         self, origin: NDArray[np.float32], direction: NDArray[np.float32], reach: NDArray[np.float32]
     ) -> NDArray[np.uint8]:
+        """As `Intersector.occluded`."""
         self.shadow_rays.append((origin.copy(), direction.copy(), reach.copy()))
         return self._intersector.occluded(origin, direction, reach)
 
@@ -109,7 +112,7 @@ def measure_frame(
         repeats: how often each is timed, 1 or more.
         tick: called after each repeat, for a progress bar.
     """
-    recorder = _RecordingIntersector(prepared.intersector)
+    recorder = RecordingIntersector(prepared.intersector)
     renderer.forget_samples()
     first = renderer.render(replace(prepared, intersector=recorder), request)  # type: ignore[arg-type]
     pool = WorkerPool(renderer.threads)
@@ -127,14 +130,14 @@ def measure_frame(
     renderer.render(prepared, moved)
     intersector = prepared.intersector
     bare, packets = (intersector.bare_nearest, intersector.bare_occluded), (intersector.nearest, intersector.occluded)
-    _trace_rays(recorder, pool, *bare)  # its search tree is built at the first use
+    trace_rays(recorder, pool, *bare)  # its search tree is built at the first use
     for _ in range(repeats):
         renderer.forget_samples()
         frame = timed(FRAME, lambda: renderer.render(prepared, request))
         times[TRACE].append(frame.cost.time_ms.trace)
         times[RECONSTRUCT].append(frame.cost.time_ms.reconstruct)
-        timed(BARE, lambda: _trace_rays(recorder, pool, *bare))
-        timed(PACKETS, lambda: _trace_rays(recorder, pool, *packets))
+        timed(BARE, lambda: trace_rays(recorder, pool, *bare))
+        timed(PACKETS, lambda: trace_rays(recorder, pool, *packets))
         timed(MOVED, lambda: renderer.render(prepared, moved))
         timed(STORED, lambda: renderer.render(prepared, request))
         timed(MAP, lambda: _build_map(request, pool))
@@ -149,13 +152,19 @@ def _build_map(request: FrameRequest, pool: WorkerPool) -> None:
     build_cell_map(quality.map, request.display, quality.acuity, bucket, pool)
 
 
-def _trace_rays(
-    recorder: _RecordingIntersector,
+def trace_rays(
+    recorder: RecordingIntersector,
     pool: WorkerPool,
     nearest: Callable[[NDArray[np.float32], NDArray[np.float32]], object],
     occluded: Callable[[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]], object],
 ) -> None:
-    """Trace the recorded rays and do nothing else, batch by batch on all threads."""
+    """Trace the recorded rays and do nothing else, batch by batch on all threads.
+
+    Args:
+        recorder: with the rays.
+        pool: threads.
+        nearest, occluded: what traces them, as the methods of `Intersector`.
+    """
     seen, shadow = recorder.nearest_rays, recorder.shadow_rays
     reaches = [reach.copy() for _, _, reach in shadow]
 

@@ -45,7 +45,7 @@ examples:
 
 DEFAULT_SCENE = "atrium"
 MOST_REPEATS = 1000
-ROWS = ("frame", "samples", "paper", "pixels", "threads", "peers", "memory")
+ROWS = ("frame", "stages", "samples", "paper", "pixels", "threads", "peers", "memory")
 
 MANY = 8
 MANY_OF_ALL = 32

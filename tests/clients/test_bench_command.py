@@ -20,7 +20,7 @@ pytestmark = pytest.mark.usefixtures("plain_environment")
 
 def test_bench_measures_the_rows_that_are_asked_for(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     words = ["bench", "spheres", *SMALL, "--repeats", "2", "--many", "3", "--threads", "3"]
-    words += ["--only", "frame,samples,paper,pixels,threads", "-o", "bench.json"]
+    words += ["--only", "frame,stages,samples,paper,pixels,threads", "-o", "bench.json"]
     assert main(words) == 0
     text = capsys.readouterr().out
     record = json.loads((tmp_path / "bench.json").read_text())
@@ -31,8 +31,9 @@ def test_bench_measures_the_rows_that_are_asked_for(capsys: pytest.CaptureFixtur
     assert rows["whole frame / bare Embree"]["unit"] == "ratio"
     assert "whole frame / bare Embree, 3 samples" in rows
     assert "trace at 270x195 / 96x54" in rows
+    assert {"map / its bytes copied", "trace / its rays in packets", "encode, 20 px further"} <= set(rows)
     assert list(dict.fromkeys(row["group"] for row in record["rows"])) == [
-        "frame", "samples", "paper", "pixels", "threads",
+        "frame", "stages", "samples", "paper", "pixels", "threads",
     ]  # fmt: skip
     for what, row in rows.items():
         numbers = r" +([\d,.]+|-)" * 3
