@@ -14,7 +14,7 @@ from renderer.intersection import Intersector
 from renderer.kernel import kernel
 from renderer.prepared import MATERIAL_COLUMN, Sieve, Surfaces
 from renderer.rays import Hits, ShadowRays
-from renderer.surface import surface_met
+from renderer.surface import go_on_behind, surface_met
 from renderer.texture import opacity
 
 MOST_HOLES = 64
@@ -58,14 +58,10 @@ def find_holes(
         material = materials[row]
         if material.alpha_picture < 0:
             continue
-        ox, oy, oz = np.float64(origin[ray, 0]), np.float64(origin[ray, 1]), np.float64(origin[ray, 2])
-        dx, dy, dz = np.float64(direction[ray, 0]), np.float64(direction[ray, 1]), np.float64(direction[ray, 2])
-        s, _, _ = surface_met(facets, surfaces.spheres, primitive, ox, oy, oz, dx, dy, dz)
+        s = surface_met(facets, surfaces.spheres, primitive, origin, direction, ray)
         if opacity(texels, pictures, material.alpha_picture, s.u, s.v) >= material.alpha_cutoff:
             continue
-        origin[ray, 0] = s.px - s.offset * s.gx
-        origin[ray, 1] = s.py - s.offset * s.gy
-        origin[ray, 2] = s.pz - s.offset * s.gz
+        go_on_behind(s, origin, ray)
         passed[ray] += distance[ray]
         rows[found] = ray
         found += 1

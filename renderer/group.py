@@ -14,7 +14,7 @@ from renderer.lanes import LANES, anywhere, choose, least
 from renderer.places import DENSITY, WEIGHTS, WIDTH, keep_surface, keep_surfaces
 from renderer.prepared import DENSITY_COLUMN, Surfaces
 from renderer.rays import Hits, Rays
-from renderer.surface import sphere_surface, triangle_surface, weights_at
+from renderer.surface import sphere_met, triangle_surface, weights_at
 
 SPHERE_DENSITY = 0.5 / math.sqrt(math.pi)
 """Texture coordinates per radius of a sphere, whose whole area one picture covers: the mean over all places."""
@@ -69,12 +69,7 @@ def meet(surfaces: Surfaces, rays: Rays, hits: Hits, first: int, group: Group, r
         rows: of `Places`.
     """
     keep(rows, WIDTH, group.width)
-    facets, radius, center, material = (
-        surfaces.facets,
-        surfaces.spheres.radius,
-        surfaces.spheres.center,
-        surfaces.spheres.material,
-    )
+    facets, radius = surfaces.facets, surfaces.spheres.radius
     triangles, solids = len(facets), len(facets) + len(radius)
     flat = (group.primitive >= 0) & (group.primitive < triangles)
     if anywhere(flat):
@@ -85,15 +80,9 @@ def meet(surfaces: Surfaces, rays: Rays, hits: Hits, first: int, group: Group, r
         keep(rows, WEIGHTS + 1, b2)
         keep(rows, DENSITY, pick(facets, t, DENSITY_COLUMN))
     if anywhere((group.primitive >= triangles) & (group.primitive < solids)):
-        origin, direction = rays.origin, rays.direction
         for lane in range(LANES):
             ray = min(first + lane, len(hits.primitive) - 1)
             k = hits.primitive[ray] - triangles
             if 0 <= k < len(radius):
-                s = sphere_surface(
-                    center[k, 0], center[k, 1], center[k, 2], radius[k], int(np.int64(material[k])),
-                    np.float64(origin[ray, 0]), np.float64(origin[ray, 1]), np.float64(origin[ray, 2]),
-                    np.float64(direction[ray, 0]), np.float64(direction[ray, 1]), np.float64(direction[ray, 2]),
-                )  # fmt: skip
-                keep_surface(rows, lane, s)
+                keep_surface(rows, lane, sphere_met(surfaces.spheres, k, rays.origin, rays.direction, ray))
                 rows[DENSITY, lane] = SPHERE_DENSITY / radius[k]

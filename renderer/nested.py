@@ -17,7 +17,7 @@ from renderer.kernel import kernel
 from renderer.media import crossed, dominant, with_medium
 from renderer.prepared import MATERIAL_COLUMN, OTHER_COLUMN, PreparedScene, Surfaces
 from renderer.rays import Hits
-from renderer.surface import sphere_surface, surface_met
+from renderer.surface import go_on_behind, sphere_met, surface_met
 
 MOST_HIDDEN = 64
 """Hidden boundaries that a ray passes, one behind the other; the next one counts as seen."""
@@ -71,9 +71,7 @@ def find_hidden(
         medium = int(np.int64(materials[row].medium))
         if medium == 0 and not everything:
             continue
-        ox, oy, oz = np.float64(origin[ray, 0]), np.float64(origin[ray, 1]), np.float64(origin[ray, 2])
-        dx, dy, dz = np.float64(direction[ray, 0]), np.float64(direction[ray, 1]), np.float64(direction[ray, 2])
-        s, _, _ = surface_met(facets, surfaces.spheres, primitive, ox, oy, oz, dx, dy, dz)
+        s = surface_met(facets, surfaces.spheres, primitive, origin, direction, ray)
         other = int(facets[primitive, OTHER_COLUMN]) if k < 0 else 0
         if medium > 0:
             before, behind = crossed(around[ray], medium, other, s.entering)
@@ -83,9 +81,7 @@ def find_hidden(
             entered[medium] += 1 if s.entering else -1
             if other != 0:
                 entered[abs(other)] += 1 if s.entering == (other > 0) else -1
-        origin[ray, 0] = s.px - s.offset * s.gx
-        origin[ray, 1] = s.py - s.offset * s.gy
-        origin[ray, 2] = s.pz - s.offset * s.gz
+        go_on_behind(s, origin, ray)
         passed[ray] += distance[ray]
         rows[found] = ray
         found += 1
@@ -109,22 +105,14 @@ def keep_origins(
         direction: (n, 3) float32.
         hits: what they met in the end.
     """
-    center, radius = surfaces.spheres.center, surfaces.spheres.radius
-    primitives = hits.primitive
+    primitives, balls = hits.primitive, len(surfaces.spheres.radius)
     triangles = len(surfaces.facets)
     for ray in range(len(primitives)):
         k = primitives[ray] - triangles
-        if k < 0 or k >= len(radius):
+        if k < 0 or k >= balls:
             continue
-        dx, dy, dz = np.float64(direction[ray, 0]), np.float64(direction[ray, 1]), np.float64(direction[ray, 2])
-        begun = sphere_surface(
-            center[k, 0], center[k, 1], center[k, 2], radius[k], 0,
-            np.float64(origin[ray, 0]), np.float64(origin[ray, 1]), np.float64(origin[ray, 2]), dx, dy, dz,
-        )  # fmt: skip
-        gone_on = sphere_surface(
-            center[k, 0], center[k, 1], center[k, 2], radius[k], 0,
-            np.float64(moved[ray, 0]), np.float64(moved[ray, 1]), np.float64(moved[ray, 2]), dx, dy, dz,
-        )  # fmt: skip
+        begun = sphere_met(surfaces.spheres, k, origin, direction, ray)
+        gone_on = sphere_met(surfaces.spheres, k, moved, direction, ray)
         if begun.entering != gone_on.entering:
             for axis in range(3):
                 origin[ray, axis] = moved[ray, axis]

@@ -166,24 +166,47 @@ def sphere_surface(
 
 
 @formula
+def sphere_met(
+    spheres: SphereTree, k: int, origin: NDArray[np.float32], direction: NDArray[np.float32], ray: int
+) -> Surface:
+    """The surface of sphere `k` where ray number `ray`, of (n, 3) float32 origins and directions, meets it."""
+    center = spheres.center
+    return sphere_surface(
+        center[k, 0], center[k, 1], center[k, 2], spheres.radius[k], int(np.int64(spheres.material[k])),
+        np.float64(origin[ray, 0]), np.float64(origin[ray, 1]), np.float64(origin[ray, 2]),
+        np.float64(direction[ray, 0]), np.float64(direction[ray, 1]), np.float64(direction[ray, 2]),
+    )  # fmt: skip
+
+
+@formula
 def surface_met(
     facets: NDArray[np.float32],
     spheres: SphereTree,
     primitive: int,
-    ox: float, oy: float, oz: float, dx: float, dy: float, dz: float,
-) -> tuple[Surface, float, float]:  # fmt: skip
-    """The surface of a triangle, or else of a sphere, that a ray met; also the barycentric weights of the triangle's
-    second and third corner, 0 on a sphere.
+    origin: NDArray[np.float32],
+    direction: NDArray[np.float32],
+    ray: int,
+) -> Surface:
+    """The surface of a triangle, or else of a sphere, that a ray met.
 
     Args:
         facets, spheres: of the scene; triangles are counted first.
         primitive: which of them.
-        ox, oy, oz, dx, dy, dz: origin and direction of the ray.
+        origin, direction: (n, 3) float32 rays.
+        ray: which of them.
     """
     k = primitive - len(facets)
-    if k < 0:
-        b1, b2 = weights_at(facets, primitive, ox, oy, oz, dx, dy, dz)
-        return triangle_surface(facets, primitive, b1, b2, dx, dy, dz), b1, b2
-    center, material = spheres.center, int(np.int64(spheres.material[k]))
-    s = sphere_surface(center[k, 0], center[k, 1], center[k, 2], spheres.radius[k], material, ox, oy, oz, dx, dy, dz)
-    return s, 0.0, 0.0
+    if k >= 0:
+        return sphere_met(spheres, k, origin, direction, ray)
+    ox, oy, oz = np.float64(origin[ray, 0]), np.float64(origin[ray, 1]), np.float64(origin[ray, 2])
+    dx, dy, dz = np.float64(direction[ray, 0]), np.float64(direction[ray, 1]), np.float64(direction[ray, 2])
+    b1, b2 = weights_at(facets, primitive, ox, oy, oz, dx, dy, dz)
+    return triangle_surface(facets, primitive, b1, b2, dx, dy, dz)
+
+
+@formula
+def go_on_behind(s: Surface, origin: NDArray[np.float32], ray: int) -> None:
+    """Move the origin of a ray just behind a surface that it goes through unbent."""
+    origin[ray, 0] = s.px - s.offset * s.gx
+    origin[ray, 1] = s.py - s.offset * s.gy
+    origin[ray, 2] = s.pz - s.offset * s.gz
