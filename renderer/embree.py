@@ -26,6 +26,7 @@ from renderer.kernel import COMPILED, c_function
 from renderer.packets import (
     COHERENT,
     INVOKE_FILTER,
+    Search,
     empty_packet,
     keeper,
     query,
@@ -121,10 +122,8 @@ class EmbreeTriangles:
             query(INVOKE_FILTER | flag, packet.distances.ctypes.data, self._library.keep_nearest)
             for flag in (0, COHERENT)
         )
-        trace_nearest(
-            self._library.intersect, self._scene, singly, together, coherent, again, packet,
-            origin, direction, primitive, distance,
-        )  # fmt: skip
+        search = Search(self._library.intersect, self._scene, singly, together)
+        trace_nearest(search, coherent, again, packet, origin, direction, primitive, distance)
         return primitive, distance
 
     def _nearest_singly(
@@ -153,11 +152,9 @@ class EmbreeTriangles:
             # Embree answers 0 for a blocked ray and -1 for a clear one.
             np.equal(self.yardstick.run(origin, direction, reach, "OCCLUDED"), 0, out=blocked.view(np.bool_))
             return
-        singly, together = query(0, 0, 0), query(COHERENT, 0, 0)
-        trace_occluded(
-            self._library.occluded, self._scene, singly, together if coherent else singly,
-            empty_packet(self._library.width), origin, direction, reach, blocked,
-        )  # fmt: skip
+        singly, together = query(0, 0, 0), query(COHERENT if coherent else 0, 0, 0)
+        search = Search(self._library.occluded, self._scene, singly, together)
+        trace_occluded(search, empty_packet(self._library.width), origin, direction, reach, blocked)
 
 
 def plain_scene(vertices: NDArray[np.float32], faces: NDArray[np.int32], *, robust: bool) -> EmbreeScene:

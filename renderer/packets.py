@@ -77,6 +77,21 @@ class Packet(NamedTuple):
     numbers: NDArray[np.int32]
 
 
+class Search(NamedTuple):
+    """What searches for what rays meet.
+
+    Attributes:
+        function: address of Embree's function for packets.
+        scene: Embree's scene.
+        singly, together: (8,) int64 queries, for rays that go each their own way, and for a packet of much the same.
+    """
+
+    function: int
+    scene: int
+    singly: NDArray[np.int64]
+    together: NDArray[np.int64]
+
+
 def query(flags: int, context: int, filter_address: int) -> NDArray[np.int64]:
     """RTCIntersectArguments or RTCOccludedArguments: flags and features, context, filter, nothing more.
 
@@ -224,10 +239,7 @@ def turned(direction: NDArray[np.float32]) -> NDArray[np.float32]:
 
 @kernel
 def trace_nearest(
-    intersect: int,
-    scene: int,
-    singly: NDArray[np.int64],
-    together: NDArray[np.int64],
+    search: Search,
     coherent: bool,
     again: bool,
     packet: Packet,
@@ -242,12 +254,12 @@ def trace_nearest(
         count = min(width, len(primitive) - first)
         parallel = _load_packet(packet, origin, direction, first, count)
         _forget(packet)
-        _search(intersect, scene, singly, together, coherent and not parallel, packet, origin, direction, first, False)
+        _search(search, coherent and not parallel, packet, origin, direction, first, False)
         missed = 0
         for lane in range(count):
             missed |= 1 if numbers[NUMBERS + lane] < 0 else 0
         if again and missed != 0:
-            _search_again(intersect, scene, singly, together, coherent, packet, origin, direction, first, count)
+            _search_again(search, coherent, packet, origin, direction, first, count)
         for lane in range(count):
             primitive[first + lane] = numbers[NUMBERS + lane]
             distance[first + lane] = distances[DISTANCES + lane]
@@ -268,10 +280,7 @@ def _forget(packet: Packet) -> None:
 
 @kernel
 def _search(
-    intersect: int,
-    scene: int,
-    singly: NDArray[np.int64],
-    together: NDArray[np.int64],
+    search: Search,
     packed: bool,
     packet: Packet,
     origin: NDArray[np.float32],
@@ -281,8 +290,8 @@ def _search(
 ) -> None:
     """Search along the valid rays of a packet, which are loaded; near an edge, packed ones once more, singly."""
     width, valid, distances, numbers = packet.width, packet.valid, packet.distances, packet.numbers
-    query = together if packed else singly
-    call(intersect, valid.ctypes.data, scene, packet.rows.ctypes.data, query.ctypes.data)
+    query = search.together if packed else search.singly
+    call(search.function, valid.ctypes.data, search.scene, packet.rows.ctypes.data, query.ctypes.data)
     doubtful = 0
     for lane in range(LANES):
         doubtful |= 1 if distances[MARGINS + lane] < NEAR_EDGE else 0
@@ -296,15 +305,12 @@ def _search(
             if turned:
                 _turn_aside(packet, lane)
             distances[DISTANCES + lane], numbers[NUMBERS + lane] = np.inf, -1
-    call(intersect, valid.ctypes.data, scene, packet.rows.ctypes.data, singly.ctypes.data)
+    call(search.function, valid.ctypes.data, search.scene, packet.rows.ctypes.data, search.singly.ctypes.data)
 
 
 @kernel
 def _search_again(
-    intersect: int,
-    scene: int,
-    singly: NDArray[np.int64],
-    together: NDArray[np.int64],
+    search: Search,
     coherent: bool,
     packet: Packet,
     origin: NDArray[np.float32],
@@ -320,15 +326,12 @@ def _search_again(
         if packet.valid[lane] != 0:
             parallel |= _load_ray(packet, lane, origin, direction, first + lane, np.float32(np.inf))
             _turn_aside(packet, lane)
-    _search(intersect, scene, singly, together, coherent and not parallel, packet, origin, direction, first, True)
+    _search(search, coherent and not parallel, packet, origin, direction, first, True)
 
 
 @kernel
 def trace_occluded(
-    occluded: int,
-    scene: int,
-    singly: NDArray[np.int64],
-    together: NDArray[np.int64],
+    search: Search,
     packet: Packet,
     origin: NDArray[np.float32],
     direction: NDArray[np.float32],
@@ -339,9 +342,9 @@ def trace_occluded(
     width, valid, rows = packet.width, packet.valid, packet.rows
     for first in range(0, len(blocked), width):
         count = min(width, len(blocked) - first)
-        query = singly if _load_packet(packet, origin, direction, first, count) else together
+        query = search.singly if _load_packet(packet, origin, direction, first, count) else search.together
         for lane in range(count):
             rows[FAR * width + lane] = reach[first + lane]
-        call(occluded, valid.ctypes.data, scene, rows.ctypes.data, query.ctypes.data)
+        call(search.function, valid.ctypes.data, search.scene, rows.ctypes.data, query.ctypes.data)
         for lane in range(count):
             blocked[first + lane] = 1 if rows[FAR * width + lane] == -np.inf else 0
