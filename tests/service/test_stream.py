@@ -209,12 +209,13 @@ def test_a_frame_that_was_given_up_leaves_no_garbage(address: str) -> None:
     gc.disable()
     try:
         with viewer(address) as eye:
-            eye.say(configure(0, "spheres", quality={"samples_per_cell": 64}))
-            for turn in range(1, 8):
-                eye.say(Camera(turn, {"position": [turn / 10, 2, 8], "look_at": [0, 1, 0]}))
-                while eye.frame().header.config != turn:
-                    pass
-            eye.final()
+            screen = {**TINY, "width_px": 320, "height_px": 180}
+            eye.say(configure(1, "spheres", display=screen, quality={"samples_per_cell": 256}))
+            for x in range(0, 320, 64):
+                eye.say(Gaze(float(x), 90.0))
+                eye.frame(lambda header, x=x: header.gaze is not None and header.gaze.x == x)
+            eye.say(configure(2))
+            eye.frame(lambda header: header.config == 2 and header.phase == "final")
             given_up = [thing for thing in gc.get_objects() if type(thing) is Abandoned]
     finally:
         gc.enable()
