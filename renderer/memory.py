@@ -20,6 +20,9 @@ from renderer.quality import Quality
 from renderer.store import SampleStore, held_by_number, slots_needed, slots_of
 from renderer.workers import Workers
 
+ENTRY_BYTES = 2 << 10
+"""Objects about the arrays of a map, or of samples, and its key: 1.3 KB each were measured for screens of one pixel."""
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class NumberedMap:
@@ -49,8 +52,8 @@ class Memory:
     """
 
     def __init__(self, map_bytes: int, store_bytes: int) -> None:
-        self.maps: ByteCache[Hashable, NumberedMap] = ByteCache(map_bytes, lambda value: value.nbytes)
-        self.stores: ByteCache[Hashable, SampleStore] = ByteCache(store_bytes, lambda value: value.nbytes)
+        self.maps: ByteCache[Hashable, NumberedMap] = ByteCache(map_bytes, _size)
+        self.stores: ByteCache[Hashable, SampleStore] = ByteCache(store_bytes, _size)
 
     def map(self, display: Display, quality: Quality, gaze: Gaze, pool: Workers) -> tuple[NumberedMap, bool]:
         """The map for a gaze, built on `pool` if it is not there, and whether it was there."""
@@ -98,6 +101,10 @@ class Memory:
                 yield Work(acuity, True, forecast_held(display, acuity, bucket, number, settled, wanted))
             else:
                 yield Work(acuity, False, held_by_number(number, settled, numbered.slots, wanted))
+
+
+def _size(kept: NumberedMap | SampleStore) -> int:
+    return kept.nbytes + ENTRY_BYTES
 
 
 def _bucket(quality: Quality, gaze: Gaze) -> GazeBucket:
