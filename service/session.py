@@ -334,6 +334,7 @@ class Session:
             return rendering.result()
         finally:
             abandon.set()
+            rendering.add_done_callback(_forget_error)
             del rendering  # its error refers to this call: the two would keep each other, and the frame's memory
 
     def _overtaken(self, configuration: Configuration, progress: Progress, began_ns: int) -> bool:
@@ -419,3 +420,9 @@ class Session:
             )
         finally:
             woken.cancel()
+
+
+def _forget_error(rendering: asyncio.Future[Any]) -> None:
+    """Have a frame that nobody waits for any more end without a complaint in the log that it was given up."""
+    if not rendering.cancelled():
+        rendering.exception()
