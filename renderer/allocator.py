@@ -38,8 +38,8 @@ SPARE_BYTES = 32 << 20
 SPARES = 64
 """Pages that were given back stay for the next array of their size: so much of them, and so many."""
 
-SIZES = 8
-"""Sizes that pages have between a power of two and the next: arrays of nearly the same size share them."""
+WASTE = 4
+"""One part in so many of an array's pages may be left over: maps of one screen differ in size by less."""
 
 
 @functools.cache
@@ -81,10 +81,8 @@ def apart(shape: int | tuple[int, ...], dtype: DTypeLike, zeroed: bool = False) 
     size = math.prod(lengths) * np.dtype(dtype).itemsize
     if size < APART_BYTES or not hasattr(mmap, "MAP_ANONYMOUS"):
         return np.zeros(lengths, dtype) if zeroed else np.empty(lengths, dtype)
-    step = max(1 << (size.bit_length() - 1), mmap.PAGESIZE * SIZES) // SIZES
-    rounded = -(-size // step) * step
-    used = _spare_pages(rounded)
-    pages = used or _new_pages(rounded)
+    used = _spare_pages(size)
+    pages = used or _new_pages(size)
     owner = np.frombuffer(pages, np.uint8)
     weakref.finalize(owner, _give_back, pages).atexit = False
     array = owner[:size].view(dtype).reshape(lengths)
@@ -97,12 +95,15 @@ _spare: deque[mmap.mmap] = deque(maxlen=SPARES)
 
 
 def _spare_pages(size: int) -> mmap.mmap | None:
-    """Spare pages of this size, if there are any. Without a lock: other arrays may end at any moment in here."""
-    for pages in list(_spare):
-        if len(pages) == size:
-            with contextlib.suppress(ValueError):  # another thread was faster
-                _spare.remove(pages)
-                return pages
+    """The fewest spare pages of at least this size that are no waste, if there are any.
+
+    Without a lock: other arrays may end at any moment in here.
+    """
+    fitting = [pages for pages in list(_spare) if size <= len(pages) <= size + size // WASTE]
+    for pages in sorted(fitting, key=len):
+        with contextlib.suppress(ValueError):  # another thread was faster
+            _spare.remove(pages)
+            return pages
     return None
 
 

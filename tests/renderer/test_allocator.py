@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from renderer import allocator
 from renderer.allocator import APART_BYTES, SPARE_BYTES, apart
 
 BLOCKS, BLOCK_BYTES = 6, 8 << 20
@@ -19,6 +20,7 @@ BLOCKS, BLOCK_BYTES = 6, 8 << 20
 START = """
 import json, resource, sys, threading
 import numpy as np
+from renderer import allocator
 from renderer.allocator import keep_freed_memory
 
 blocks, block_bytes = int(sys.argv[1]), int(sys.argv[2])
@@ -66,6 +68,7 @@ MAPS_OF_FRAMES = """
 import ctypes, json, random, sys
 from collections import deque
 import numpy as np
+from renderer import allocator
 from renderer.allocator import apart, keep_freed_memory
 
 class Info(ctypes.Structure):  # struct mallinfo2 of malloc.h
@@ -128,6 +131,18 @@ def test_pages_go_to_the_next_array_once_nobody_sees_them() -> None:
     del view
     others = [apart((40_000, 3), np.float32).ctypes.data for _ in range(3)]
     assert place in others
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="arrays have no pages of their own there")
+@pytest.mark.parametrize(("length", "taken"), [(1.0, True), (0.85, True), (0.7, False), (1.05, False)])
+def test_pages_go_to_arrays_that_are_a_little_smaller_at_most(length: float, taken: bool) -> None:
+    allocator._spare.clear()
+    bytes_before = 3 * MIB + 12_345
+    first = apart(bytes_before, np.uint8)
+    place = first.ctypes.data
+    del first
+    second = apart(int(length * bytes_before), np.uint8)
+    assert (second.ctypes.data == place) is taken
 
 
 @pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="needs /proc")
