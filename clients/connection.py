@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 import random
 import time
 from collections.abc import Awaitable, Callable
@@ -64,17 +65,21 @@ def stream_url(url: str, path: str) -> str:
 
 
 class _Connection(ClientConnection):
-    """A connection kept for as long as anything arrives: an answer may be stuck behind a frame on a slow line."""
+    """A connection kept for as long as anything arrives: an answer may be stuck behind a frame on a slow line.
+
+    Attributes:
+        arrived_s: when anything did, by `time.monotonic` [s].
+    """
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Begin to listen."""
         super().connection_made(transport)
-        self._arrived_s = self.loop.time()
+        self.arrived_s = time.monotonic()
         self._timer = self.loop.call_later(SILENCE_S, self._listen)
 
     def data_received(self, data: bytes) -> None:
         """The service lives."""
-        self._arrived_s = self.loop.time()
+        self.arrived_s = time.monotonic()
         super().data_received(data)
 
     def connection_lost(self, exc: Exception | None) -> None:
@@ -83,7 +88,7 @@ class _Connection(ClientConnection):
         super().connection_lost(exc)
 
     def _listen(self) -> None:
-        left_s = self._arrived_s + SILENCE_S - self.loop.time()
+        left_s = self.arrived_s + SILENCE_S - time.monotonic()
         if left_s > 0:
             self._timer = self.loop.call_later(left_s, self._listen)
         else:
@@ -99,13 +104,15 @@ async def stay_connected(
         url: a WebSocket.
         talk: uses a connection until it is closed, and raises ConnectionClosed then.
         heard_s: when something good was last heard, by `time.monotonic` [s].
-        patience_s: how long after that to go on trying [s].
+        patience_s: how long after that, and after what else came with it, to go on trying [s].
 
     Raises:
         ServiceRefused: where the next attempt would fail like this one; also what `talk` raises.
         ServiceGone: after `patience_s`.
     """
     backoff = Backoff(random.random)
+    connection: ClientConnection | None = None
+    arrived_s = -math.inf
     while True:
         began_s = heard_s()
         try:
@@ -131,7 +138,9 @@ async def stay_connected(
             why = str(error) or type(error).__name__
         if heard_s() > began_s:
             backoff.restart()
-        if time.monotonic() - heard_s() > patience_s:
+            assert isinstance(connection, _Connection)
+            arrived_s = connection.arrived_s
+        if time.monotonic() - max(heard_s(), arrived_s) > patience_s:
             raise ServiceGone(f"{url}: no service for {patience_s:g} s: {why}")
         await asyncio.sleep(backoff.wait_s())
 

@@ -1,4 +1,4 @@
-"""A client's WebSocket connection, kept for as long as the client takes in anything, however slowly."""
+"""A client's WebSocket connection, kept for as long as the client takes in what it is sent (how fast: `pace`)."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ class SlowLine:
     """Carries one connection: what the client says at once, what the service says at `bytes_per_s`.
 
     Attributes:
-        url: where a client may connect, once.
+        url: where clients may connect, one after the other.
         bytes_per_s: may be changed at any time; 0: nothing passes.
         passed: bytes that came down to the client.
     """
@@ -37,7 +37,8 @@ class SlowLine:
         self.url = f"http://127.0.0.1:{self._listener.getsockname()[1]}"
         self._moved = threading.Condition()
         self._over = threading.Event()
-        self._thread = threading.Thread(target=self._carry)
+        self._cut = threading.Event()
+        self._thread = threading.Thread(target=self._work)
         self._thread.start()
 
     @cached_property
@@ -50,6 +51,10 @@ class SlowLine:
         with self._moved:
             assert self._moved.wait_for(lambda: self.passed >= passed, PATIENCE_S)
 
+    def cut(self) -> None:
+        """End the connection that there is."""
+        self._cut.set()
+
     def close(self) -> None:
         """End both connections."""
         self._over.set()
@@ -60,28 +65,27 @@ class SlowLine:
 
     def _connect(self) -> tuple[socket.socket, socket.socket] | None:
         """The client that connects, and the service behind; None if the line is to end before."""
-        with self._listener:
-            while not self._over.is_set():
-                with suppress(TimeoutError):
-                    near, _ = self._listener.accept()
-                    far = socket.socket()
-                    far.setsockopt(
-                        socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER_BYTES
-                    )  # before there is a window to tell
-                    near.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, BUFFER_BYTES)
-                    host, port = self._address.removeprefix("http://").split(":")
-                    far.connect((host, int(port)))
-                    return near, far
+        while not self._over.is_set():
+            with suppress(TimeoutError):
+                near, _ = self._listener.accept()
+                far = socket.socket()
+                far.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER_BYTES)  # before there is a window to tell
+                near.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, BUFFER_BYTES)
+                host, port = self._address.removeprefix("http://").split(":")
+                far.connect((host, int(port)))
+                return near, far
         return None
 
-    def _carry(self) -> None:
-        ends = self._connect()
-        if ends is None:
-            return
-        near, far = ends
+    def _work(self) -> None:
+        with self._listener:
+            while (ends := self._connect()) is not None:
+                self._cut.clear()
+                self._carry(*ends)
+
+    def _carry(self, near: socket.socket, far: socket.socket) -> None:
         due = time.monotonic()
         with near, far:
-            while not self._over.is_set():
+            while not (self._over.is_set() or self._cut.is_set()):
                 now = time.monotonic()
                 may_pass = self.bytes_per_s > 0 and now >= due
                 wait_s = GLANCE_S if may_pass or due <= now else min(GLANCE_S, due - now)
