@@ -76,7 +76,7 @@ def rights_of(settings: Settings, authorization: str | None) -> frozenset[Right]
         (settings.view_token, frozenset({Right.VIEW})),
         (settings.gaze_token, frozenset({Right.GAZE})),
     ):
-        if token is not None and hmac.compare_digest(shown.strip().encode(), token.encode()):
+        if token is not None and hmac.compare_digest(shown.strip().encode(errors="surrogatepass"), token.encode()):
             rights |= granted
     return rights if rights and scheme.lower() == "bearer" else "the token is wrong"
 

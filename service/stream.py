@@ -322,8 +322,8 @@ def _reason(error: protocol.Error) -> str:
 
 
 def _cut(text: str) -> str:
-    """As much of a reason as a close frame holds."""
-    return text.encode()[:LONGEST_REASON_BYTES].decode(errors="ignore")
+    """As much of a reason as a close frame holds; JSON may bring halves of surrogate pairs, which UTF-8 has not."""
+    return text.encode(errors="backslashreplace")[:LONGEST_REASON_BYTES].decode(errors="ignore")
 
 
 def _summary(session: Session) -> SessionSummary:

@@ -39,6 +39,9 @@ def refused(found: Peer) -> tuple[int, Error]:
         ('{"type":"configure","id":1,"scene":"matte","colour":1}', "colour"),
         ('{"type":"ack","frame":1}', "frame"),
         ('{"type":"hello","session":"a/b"}', "session"),
+        ('{"type":"hello","session":"\\ud800"}', "session"),
+        ('{"type":"\\udfff"}', "type"),
+        ('{"type":"hello","\\ud800":1}', "\ud800"),
     ],
 )
 def test_what_the_wire_does_not_allow_ends_the_stream(address: str, said: str | bytes, field: str) -> None:
@@ -134,7 +137,7 @@ def test_the_token_is_in_a_header_or_in_the_first_message(renderer: Renderer) ->
         with source(address, "fed") as found:
             found.say(Hello(TOKEN))
             assert found.next(Ready)
-        for token, options in ((None, {}), ("wrong-token", {}), (TOKEN, wrong)):
+        for token, options in ((None, {}), ("wrong-token", {}), ("\ud800", {}), (TOKEN, wrong)):
             with viewer(address, token=token, **options) as found:
                 code, error = refused(found)
                 assert (code, error.code) == (CloseCode.TOKEN, "token-needed")
