@@ -21,10 +21,12 @@ def listen(settings: Settings) -> socket.socket:
         family, _, _, _, address = socket.getaddrinfo(
             settings.host, settings.port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
         )[0]
-        return socket.create_server(address[:2], family=family, backlog=BACKLOG)
+        made = socket.create_server(address[:2], family=family, backlog=BACKLOG)
     except (OSError, UnicodeError) as error:
         found = f"{settings.host}:{settings.port} ({getattr(error, 'strerror', None) or error})"
         raise SettingsError("host and port", "an address to listen on", found) from None
+    # Found out anew, the socket knows its protocol: only then asyncio sends small replies without delay (TCP_NODELAY).
+    return socket.socket(fileno=made.detach())
 
 
 def address_of(settings: Settings, listener: socket.socket) -> str:

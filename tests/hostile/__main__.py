@@ -17,6 +17,10 @@ from tests.service.process import ServiceProcess, service_process
 
 TELL_S = 30.0
 
+LEAST_KEPT_BYTES = 100
+"""What a request or a message takes at least, were it kept: its text or its fields, and a place in a container. Tables
+of bounded size that fill with what is asked for make a line rise by less."""
+
 
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m tests.hostile", description=__doc__)
@@ -34,7 +38,7 @@ def main() -> None:
             growth = _stream(service, arguments.messages, arguments.seed)
         print("state   ", before.check())
         print("memory  ", growth, "messages" if arguments.what == "stream" else "requests")
-        assert growth.flat
+        assert growth.flat or growth.most < LEAST_KEPT_BYTES
 
 
 def _http(service: ServiceProcess, cases: int, seed: int, workers: int) -> Growth:
