@@ -86,8 +86,8 @@ class SlowLine:
         due = time.monotonic()
         with near, far:
             while not (self._over.is_set() or self._cut.is_set()):
-                now = time.monotonic()
-                may_pass = self.bytes_per_s > 0 and now >= due
+                now, bytes_per_s = time.monotonic(), self.bytes_per_s
+                may_pass = bytes_per_s > 0 and now >= due
                 wait_s = GLANCE_S if may_pass or due <= now else min(GLANCE_S, due - now)
                 readable, _, _ = select.select([near, *([far] if may_pass else [])], [], [], wait_s)
                 for end, other in ((near, far), (far, near)):
@@ -104,7 +104,7 @@ class SlowLine:
                         with self._moved:
                             self.passed += len(data)
                             self._moved.notify_all()
-                        due = max(due, now) + len(data) / self.bytes_per_s
+                        due = max(due, now) + len(data) / bytes_per_s
 
 
 @contextmanager
