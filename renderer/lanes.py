@@ -41,7 +41,7 @@ def either(compiled: Any, plain: Any) -> Any:
     return compiled if COMPILED else plain
 
 
-FLOATS, INTS, MARKS = Lanes(types.float64), Lanes(types.int64), Lanes(types.boolean)
+FLOATS, INTS = Lanes(types.float64), Lanes(types.int64)
 WORDS = {types.float64: ir.DoubleType(), types.int64: ir.IntType(64), types.boolean: ir.IntType(1)}
 _INDEX = ir.IntType(32)
 _ADDRESS = ir.IntType(64)
