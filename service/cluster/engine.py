@@ -16,7 +16,7 @@ import sys
 import threading
 import time
 from concurrent.futures import Future
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from typing import Any, Final
 
@@ -66,6 +66,7 @@ class _Node:
         number: of its worker.
         since: when it was started, or may be [monotonic s].
         ready: whether it has said so.
+        asked: whether it was asked if it is still there, and has not answered yet.
         pause_s: before the next one, should this fail.
     """
 
@@ -74,8 +75,8 @@ class _Node:
     number: int = 0
     since: float = 0.0
     ready: bool = False
+    asked: bool = False
     pause_s: float = FIRST_PAUSE_S
-    beginnings: list[Future[Any]] = field(default_factory=list)
 
 
 class Engine:
@@ -148,7 +149,7 @@ class Engine:
             pause.wait(LOOK_S)
 
     def _look(self) -> None:
-        """Start workers where they are missing; forget nodes that are gone."""
+        """Start workers where they are missing, ask the others whether they are there; forget nodes that are gone."""
         alive = {node["NodeID"]: int(node["Resources"].get("CPU", 0)) for node in self._ray.nodes() if node["Alive"]}
         now = time.monotonic()
         with self._lock:
@@ -160,12 +161,15 @@ class Engine:
                 node = self._nodes.setdefault(name, _Node(threads))
                 if node.worker is None and now >= node.since:
                     self._start(name, node)
+                elif node.ready and not node.asked:
+                    self._ask_after(node)
 
     def _start(self, name: str, node: _Node) -> None:
         affinity = self._ray.util.scheduling_strategies.NodeAffinitySchedulingStrategy(name, soft=False)
         options = {"num_cpus": 0, "max_restarts": 0, "max_concurrency": MOST_AT_ONCE, "scheduling_strategy": affinity}
         self._numbers += 1
-        node.worker, node.number, node.ready = self._actor.options(**options).remote(node.threads), self._numbers, False
+        node.worker, node.number = self._actor.options(**options).remote(node.threads), self._numbers
+        node.ready = node.asked = False
         number = node.number
         self._workers[number] = node.worker
         self.tell(START, number, node.threads)
@@ -182,6 +186,19 @@ class Engine:
                 self.tell(JOINED, number, presence)
                 return
         self._lose(number, "" if error is None else str(error).partition("\n")[0])
+
+    def _ask_after(self, node: _Node) -> None:
+        """Notice a worker that has ended while it had nothing to do: Ray tells only who asks it for something."""
+        number, node.asked = node.number, True
+
+        def answered(done: Future[Any]) -> None:
+            if done.exception() is not None:
+                self._lose(number)
+            with self._lock:
+                if node.number == number:
+                    node.asked = False
+
+        node.worker.presence.remote().future().add_done_callback(answered)
 
     def _lose(self, number: int, why: str = "") -> None:
         """A worker is gone; another takes its place if its node is still there."""

@@ -102,9 +102,9 @@ def asked(quality: Quality, gaze: tuple[float, float] = (30, 20), screen: Displa
     return FrameRequest(Gaze(*gaze), screen, None, quality, linear=True)
 
 
-def long_frame() -> FrameRequest:
-    """Some seconds of work."""
-    return asked(Quality(map="full", samples_per_cell=64), screen=Display(160, 90))
+def long_frame(samples: int = 64) -> FrameRequest:
+    """Some work for all workers; half a minute with 4096 samples."""
+    return asked(Quality(map="full", samples_per_cell=samples), screen=Display(160, 90))
 
 
 def same(one: Frame, other: Frame) -> None:
@@ -135,19 +135,30 @@ def test_a_frame_that_is_given_up_ends_soon(far: Renderer, scene: PreparedScene)
     abandon = threading.Event()
     threading.Timer(0.3, abandon.set).start()
     with pytest.raises(Abandoned):
-        far.render(scene, long_frame(), abandon)
+        far.render(scene, long_frame(4096), abandon)
 
 
 def test_a_worker_killed_in_the_middle_of_a_frame_costs_a_delay(
     cluster: Cluster, far: Renderer, renderer: Renderer, scene: PreparedScene, said: Said
 ) -> None:
-    """Its pieces are traced by the other one; another worker takes its place."""
-    far.forget_samples()
+    """Its pieces are traced by the other one; another worker takes its place. It stands still before, to have some."""
     victim = cluster.workers[0].process
+    far.render(scene, long_frame())
+    far.forget_samples()
+    os.kill(victim, signal.SIGSTOP)
     threading.Timer(0.3, os.kill, (victim, signal.SIGKILL)).start()
     found = far.render(scene, long_frame())
     said.wait_for("is gone: 1 left")
     same(found, renderer.render(scene, long_frame()))
+    cluster.wait_ready(START_S, 2)
+    assert victim not in [worker.process for worker in cluster.workers]
+
+
+def test_a_worker_that_ends_while_it_has_nothing_to_do_is_replaced(cluster: Cluster, said: Said) -> None:
+    """Nobody asks it for anything, and yet its end is noticed."""
+    gone, victim = said.count("is gone"), cluster.workers[0].process
+    os.kill(victim, signal.SIGKILL)
+    said.wait_for("is gone", gone + 1)
     cluster.wait_ready(START_S, 2)
     assert victim not in [worker.process for worker in cluster.workers]
 
