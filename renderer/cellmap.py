@@ -66,7 +66,7 @@ def build_cell_map(kind: str, display: Display, acuity: Acuity, bucket: GazeBuck
         pool: threads to build it on; the map does not depend on their number.
     """
     if kind == "full":
-        return _full_map(display, bucket)
+        return _full_map(display, bucket, pool)
     eye = eye_geometry(display, acuity, bucket)
     if kind == "scanline":
         return _scanline_map(eye, bucket, pool)
@@ -80,12 +80,20 @@ def cell_sizes(display: Display, acuity: Acuity, bucket: GazeBucket) -> NDArray[
     return sizes
 
 
-def _full_map(display: Display, bucket: GazeBucket) -> CellMap:
+def _full_map(display: Display, bucket: GazeBucket, pool: Workers) -> CellMap:
     width, height = display.width_px, display.height_px
-    x, y, side, mask = (apart((height, width), np.int32) for _ in range(4))
-    x[:], y[:] = np.arange(width), np.arange(height)[:, None]
-    side[:], mask[:] = 1, np.arange(width * height).reshape(height, width)
-    return CellMap("full", bucket, x.ravel(), y.ravel(), side.ravel(), mask)
+    tile_px = tile_side(1)
+    tops = range(0, height, tile_px)
+    sides = np.ones(-(-width // tile_px), dtype=np.uint16)
+    corners = np.zeros((len(sides), tile_px, tile_px), dtype=np.uint16)
+    x, y, side = (apart(width * height, np.int32) for _ in range(3))
+    mask = apart((height, width), np.int32)
+
+    def number(strip: int) -> None:
+        number_cells(tops[strip], tops[strip] * width, corners, sides, x, y, side, mask)
+
+    pool.run(number, len(tops))
+    return CellMap("full", bucket, x, y, side, mask)
 
 
 def _aligned_map(eye: EyeGeometry, bucket: GazeBucket, pool: Workers) -> CellMap:

@@ -219,6 +219,19 @@ def test_every_setting_that_shapes_the_map_is_part_of_its_key(fresh: Renderer) -
         assert fresh.cell_map(display, same, gaze)[1]
 
 
+@pytest.mark.parametrize("kind", ["aligned", "full"])
+def test_sixteen_cells_after_one_another_are_a_square_of_neighbours(kind: str, pool: WorkerPool) -> None:
+    """Four by four cells of one size, so that rays traced together go alike: all in a full map, most in an aligned."""
+    display = Display(192, 192, width_cm=10.0, height_cm=10.0)
+    cells = build_cell_map(kind, display, Acuity(), GazeBucket(96.0, 96.0, 16), pool)
+    whole = cells.cells // 16 * 16
+    x, y, side = (array[:whole].reshape(-1, 16) for array in (cells.x, cells.y, cells.side))
+    alike = (side == side[:, :1]).all(axis=1)
+    across, down = (np.ptp(array, axis=1) // side[:, 0] + 1 for array in (x, y))
+    square = alike & (across == 4) & (down == 4)
+    assert square.mean() > (0.6 if kind == "aligned" else 0.99), square.mean()
+
+
 def test_a_full_map_serves_every_gaze(fresh: Renderer) -> None:
     display, quality = Display(160, 90), Quality(map="full")
     first, _ = fresh.cell_map(display, quality, Gaze(0.0, 0.0))
