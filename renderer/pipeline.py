@@ -6,7 +6,7 @@ import threading
 import time
 
 from renderer.acuity import Acuity
-from renderer.allocator import keep_freed_memory
+from renderer.allocator import keep_freed_memory, keep_spare_pages
 from renderer.cellmap import CellMap
 from renderer.deadline import NS_PER_MS, affordable_samples, fitted, seen
 from renderer.display import Display
@@ -31,6 +31,9 @@ from renderer.workers import WorkerPool
 DEFAULT_MAP_CACHE_BYTES = 256 << 20
 DEFAULT_STORE_BYTES = 512 << 20
 
+CACHES_TO_SPARE = 6
+"""What the caches may hold over the pages that wait for what comes into them: by default room for a store of 1080p."""
+
 
 class Renderer:
     """Renders frames on shared threads, keeping cell maps and samples between them.
@@ -54,6 +57,7 @@ class Renderer:
             tracing: what traces samples; None for the threads.
         """
         keep_freed_memory()
+        keep_spare_pages((map_cache_bytes + store_bytes) // CACHES_TO_SPARE)
         self._memory = Memory(map_cache_bytes, store_bytes)
         self.map_cache = self._memory.maps
         self.store_cache = self._memory.stores

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from renderer import allocator
-from renderer.allocator import APART_BYTES, SPARE_BYTES, apart
+from renderer.allocator import APART_BYTES, SPARE_BYTES, apart, keep_spare_pages
 
 BLOCKS, BLOCK_BYTES = 6, 8 << 20
 
@@ -146,15 +146,19 @@ def test_pages_go_to_arrays_that_are_a_little_smaller_at_most(length: float, tak
 
 
 @pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="needs /proc")
-def test_few_pages_wait_for_a_next_array() -> None:
+@pytest.mark.parametrize("most_bytes", [SPARE_BYTES, SPARE_BYTES // 4])
+def test_few_pages_wait_for_a_next_array(most_bytes: int) -> None:
     def resident_bytes() -> int:
         return int(Path("/proc/self/statm").read_text().split()[1]) * mmap.PAGESIZE
 
+    keep_spare_pages(0)
     before = resident_bytes()
+    keep_spare_pages(most_bytes)
     arrays = [apart(length, np.uint8) for length in range(MIB, 5 * MIB, MIB // 16)]
     for array in arrays:
         array.fill(1)
     assert resident_bytes() - before > 4 * SPARE_BYTES
     del array
     arrays.clear()
-    assert resident_bytes() - before < SPARE_BYTES + 8 * MIB
+    assert most_bytes - 5 * MIB < resident_bytes() - before < most_bytes + 8 * MIB
+    keep_spare_pages(SPARE_BYTES)
