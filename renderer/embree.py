@@ -11,6 +11,7 @@ from __future__ import annotations
 import ctypes
 import functools
 import logging
+import threading
 import weakref
 from pathlib import Path
 from typing import NamedTuple
@@ -26,6 +27,7 @@ from renderer.kernel import COMPILED, c_function
 from renderer.packets import (
     COHERENT,
     INVOKE_FILTER,
+    Packet,
     Search,
     empty_packet,
     keeper,
@@ -74,6 +76,39 @@ class Library(NamedTuple):
     keep_nearest: int
 
 
+class _Room(NamedTuple):
+    """What a thread searches with: made once, since that takes as long as tracing some hundred rays.
+
+    Attributes:
+        library: it is for.
+        packet: room for rays.
+        nearest_singly, nearest_together, occluded_singly, occluded_together: queries of `Search`.
+    """
+
+    library: Library
+    packet: Packet
+    nearest_singly: NDArray[np.int64]
+    nearest_together: NDArray[np.int64]
+    occluded_singly: NDArray[np.int64]
+    occluded_together: NDArray[np.int64]
+
+
+_local = threading.local()
+
+
+def _room_of(library: Library) -> _Room:
+    """This thread's room."""
+    held: _Room | None = getattr(_local, "room", None)
+    if held is None or held.library is not library:
+        packet = empty_packet(library.width)
+        nearest = (
+            query(INVOKE_FILTER | flag, packet.distances.ctypes.data, library.keep_nearest) for flag in (0, COHERENT)
+        )
+        held = _Room(library, packet, *nearest, *(query(flag, 0, 0) for flag in (0, COHERENT)))
+        _local.room = held
+    return held
+
+
 class EmbreeTriangles:
     """Triangles and their search tree; any number of threads may ask at once."""
 
@@ -117,13 +152,9 @@ class EmbreeTriangles:
             return primitive, distance
         primitive = np.empty(len(origin), dtype=np.int32)
         distance = np.empty(len(origin), dtype=np.float32)
-        packet = empty_packet(self._library.width)
-        singly, together = (
-            query(INVOKE_FILTER | flag, packet.distances.ctypes.data, self._library.keep_nearest)
-            for flag in (0, COHERENT)
-        )
-        search = Search(self._library.intersect, self._scene, singly, together)
-        trace_nearest(search, coherent, again, packet, origin, direction, primitive, distance)
+        room = _room_of(self._library)
+        search = Search(self._library.intersect, self._scene, room.nearest_singly, room.nearest_together)
+        trace_nearest(search, coherent, again, room.packet, origin, direction, primitive, distance)
         return primitive, distance
 
     def _nearest_singly(
@@ -152,9 +183,10 @@ class EmbreeTriangles:
             # Embree answers 0 for a blocked ray and -1 for a clear one.
             np.equal(self.yardstick.run(origin, direction, reach, "OCCLUDED"), 0, out=blocked.view(np.bool_))
             return
-        singly, together = query(0, 0, 0), query(COHERENT if coherent else 0, 0, 0)
-        search = Search(self._library.occluded, self._scene, singly, together)
-        trace_occluded(search, empty_packet(self._library.width), origin, direction, reach, blocked)
+        room = _room_of(self._library)
+        together = room.occluded_together if coherent else room.occluded_singly
+        search = Search(self._library.occluded, self._scene, room.occluded_singly, together)
+        trace_occluded(search, room.packet, origin, direction, reach, blocked)
 
 
 def plain_scene(vertices: NDArray[np.float32], faces: NDArray[np.int32], *, robust: bool) -> EmbreeScene:

@@ -14,7 +14,7 @@ from renderer.frame import RayCounts, RejectedSamples
 from renderer.prepared import PreparedScene
 from renderer.quality import Quality
 from renderer.store import FIRST_ROUND, SampleStore, missing_cells
-from renderer.tracing import Lack, Tracing, total_rays
+from renderer.tracing import Lack, Tracing, samples_between, total_rays
 from renderer.whitted import View
 from renderer.workers import Workers
 
@@ -62,12 +62,12 @@ class _Tracer:
         self, squares: Squares, chosen: NDArray[np.int32], first: NDArray[np.int32], until: NDArray[np.int32]
     ) -> int:
         """Trace samples first .. until - 1 of each of the `chosen` squares; return how many these are."""
-        traced = int((until - first).sum())
-        if traced == 0:
+        if len(chosen) == 0:
             return 0
         began = time.perf_counter_ns()
         found = self._tracing.trace(Lack(*self._scene, squares, chosen, first, until), self._store, self._pool)
         self.trace_ns += time.perf_counter_ns() - began
+        traced = found.rays.primary
         self.samples += traced
         self.rays = total_rays([self.rays, found.rays])
         self.rejected += found.rejected
@@ -100,16 +100,16 @@ def grow(
         Abandoned: if the pool's jobs end early.
     """
     chosen, first, held, fewest = missing_cells(store, slots, wanted, pool)
-    asked = wanted * len(chosen) - int(first.sum())
+    until = np.full_like(first, wanted)
     tracer = _Tracer(prepared, view, store, quality, pool, tracing)
     squares = Squares(cell_map.x, cell_map.y, cell_map.side, slots)
     if quality.antialiasing == "adaptive":
         verdicts = Verdicts(cell_map, slots, store, prepared.scene.exposure, pool)
         cells, traced = _trace_rounds(tracer, verdicts, squares, chosen, wanted)
-        least = min(wanted, FIRST_ROUND)
+        asked, least = samples_between(first, until), min(wanted, FIRST_ROUND)
     else:
-        cells, traced = len(chosen), tracer.trace(squares, chosen, first, np.full_like(first, wanted))
-        least = wanted
+        cells, traced = len(chosen), tracer.trace(squares, chosen, first, until)
+        asked, least = traced, wanted
     rejected = RejectedSamples(*tracer.rejected.tolist())
     return Growth(
         cells, tracer.samples, asked, tracer.rays, rejected, held + traced, max(fewest, least), tracer.trace_ns

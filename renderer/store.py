@@ -222,13 +222,13 @@ def missing_cells(store: SampleStore, slots: NDArray[np.int64], wanted: int, poo
         _find_missing(number, settled, slots[part], start, wanted, cells[part], first[part], counts[chunk])
 
     pool.run(find, len(starts))
-    parts = [slice(start, start + count) for start, count in zip(starts, counts[:, 0], strict=True)]
-    return Missing(
-        np.concatenate([cells[part] for part in parts]),
-        np.concatenate([first[part] for part in parts]),
-        int(counts[:, 1].sum()),
-        int(counts[:, 2].min()),
-    )
+    found = 0
+    for start, count in zip(starts, counts[:, 0].tolist(), strict=True):
+        if found < start:  # nothing to move where all cells lack samples
+            for row in (cells, first):
+                row[found : found + count] = row[start : start + count]
+        found += count
+    return Missing(cells[:found], first[:found], int(counts[:, 1].sum()), int(counts[:, 2].min()))
 
 
 @kernel

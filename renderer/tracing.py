@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from renderer.adaptive import Squares
 from renderer.frame import RayCounts
+from renderer.kernel import kernel
 from renderer.prepared import PreparedScene
 from renderer.quality import Quality
 from renderer.store import SampleStore, add_samples
@@ -75,7 +76,7 @@ class ThreadTracing:
         """Trace block after block of the samples, each added to the store by the thread that traced it."""
         prepared, view, quality, squares, chosen, first, until = lack
         samples, spread, white = store.samples, store.spread, store.white
-        starts = block_starts(until - first, block_rays(prepared, quality))
+        starts = block_starts(first, until, block_rays(prepared, quality))
         counts = [RayCounts()] * (len(starts) - 1)
         rejected = np.zeros((len(starts) - 1, 3), dtype=np.int64)
 
@@ -89,23 +90,40 @@ class ThreadTracing:
         return Traced(total_rays(counts), rejected.sum(axis=0))
 
 
-def block_starts(samples: NDArray[np.int32], block: int) -> list[int]:
+def block_starts(first: NDArray[np.int32], until: NDArray[np.int32], block: int) -> list[int]:
     """Where to cut a row of cells into blocks of at most `block` samples, or of a single cell of more.
 
     Args:
-        samples: (c,) int32 samples of each cell, 1 or more.
+        first, until: (c,) int32 samples first .. until - 1 of each cell, 1 or more.
         block: most samples of a block.
 
     Returns:
         the first cell of each block, and c.
     """
-    ends = np.cumsum(samples, dtype=np.int64)
-    starts = [0]
-    while starts[-1] < len(samples):
-        start = starts[-1]
-        before = int(ends[start - 1]) if start else 0
-        starts.append(max(start + 1, int(np.searchsorted(ends, before + block, side="right"))))
-    return starts
+    starts = np.empty(len(first) + 1, dtype=np.int64)
+    return [*starts[: _cut(first, until, block, starts)].tolist(), len(first)]
+
+
+@kernel
+def _cut(first: NDArray[np.int32], until: NDArray[np.int32], block: int, starts: NDArray[np.int64]) -> int:
+    """Write the first cell of each block; how many these are."""
+    blocks, held = 0, block
+    for cell in range(len(first)):
+        samples = until[cell] - first[cell]
+        if held + samples > block:
+            starts[blocks] = cell
+            blocks, held = blocks + 1, 0
+        held += samples
+    return blocks
+
+
+@kernel
+def samples_between(first: NDArray[np.int32], until: NDArray[np.int32]) -> int:
+    """How many samples first .. until - 1 of each cell are, both (c,) int32."""
+    samples = 0
+    for cell in range(len(first)):
+        samples += until[cell] - first[cell]
+    return samples
 
 
 def total_rays(counts: list[RayCounts]) -> RayCounts:

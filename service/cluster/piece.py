@@ -173,7 +173,7 @@ def _radiance(
     samples = cells.until - cells.first
     radiance = np.zeros((int(samples.sum()), 3), dtype=np.float32)
     rows = np.concatenate(([0], np.cumsum(samples)))
-    starts = block_starts(samples, block_rays(prepared, piece.quality))
+    starts = block_starts(cells.first, cells.until, block_rays(prepared, piece.quality))
     counts = [RayCounts()] * (len(starts) - 1)
 
     def trace_block(block: int) -> None:

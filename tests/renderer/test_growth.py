@@ -198,7 +198,8 @@ def test_a_map_that_is_abandoned_is_built_by_whoever_comes_next(scene: PreparedS
 
 @given(st.lists(st.integers(1, 50), max_size=60), st.integers(1, 60))
 def test_blocks_are_as_large_as_they_may_be(samples: list[int], block: int) -> None:
-    starts = block_starts(np.array(samples, np.int32), block)
+    first = np.arange(len(samples), dtype=np.int32)
+    starts = block_starts(first, first + np.array(samples, np.int32), block)
     assert (starts[0], starts[-1]) == (0, len(samples))
     for start, end in itertools.pairwise(starts):
         size = sum(samples[start:end])

@@ -97,7 +97,7 @@ def test_the_seam_adds_nothing_to_the_time_of_tracing() -> None:
     slots = int(lack.squares.slots.max()) + 1
 
     def directly(store: SampleStore) -> RayCounts:
-        squares, starts = lack.squares, block_starts(lack.until - lack.first, block_rays(prepared, lack.quality))
+        squares, starts = lack.squares, block_starts(lack.first, lack.until, block_rays(prepared, lack.quality))
         counts = [RayCounts()] * (len(starts) - 1)
 
         def block(number: int) -> None:

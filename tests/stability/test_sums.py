@@ -27,7 +27,7 @@ from renderer.scene import Mesh, Scene, Sphere
 from renderer.sphere import hit_distance
 from renderer.surface import weights_at
 from renderer.texture import wrap
-from renderer.tracing import block_starts, total_rays
+from renderer.tracing import block_starts, samples_between, total_rays
 from tests.renderer.cell_point import places
 from tests.renderer.drawing import (
     EVERYWHERE_1,
@@ -130,8 +130,10 @@ def test_h51_a_disc_covers_its_area(renderer: Renderer, radius_px: float) -> Non
 
 def test_h52_blocks_of_more_than_2_to_the_31_samples() -> None:
     """30,000 cells of 100,000 samples: sums are 64 bits wide, and every cell is in one block of at most a million."""
-    samples = np.full(30_000, 100_000, dtype=np.int32)
-    assert block_starts(samples, 1_000_000) == list(range(0, 30_001, 10))
+    first = np.zeros(30_000, dtype=np.int32)
+    until = np.full_like(first, 100_000)
+    assert block_starts(first, until, 1_000_000) == list(range(0, 30_001, 10))
+    assert samples_between(first, until) == 3_000_000_000
     counted = total_rays([RayCounts(primary=2**31 - 1, shadow=5)] * 3)
     assert counted.primary == 3 * (2**31 - 1)
     assert counted.total == 3 * (2**31 + 4)
