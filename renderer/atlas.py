@@ -43,8 +43,15 @@ class Reading(NamedTuple):
     normals: bool = False
 
 
+WHITE = Reading(Texture(np.full((1, 1, 3), 255, dtype=np.uint8), "white"))
+FLAT = Reading(Texture(np.array([[[128, 128, 255]]], dtype=np.uint8), "flat"), normals=True)
+WHITE_ROW, FLAT_ROW = -2, -1
+"""What surfaces without a texture, or without a normal map, look up where these are forced on, and where it is, from
+the end of every atlas: forced on or not, effects look up the same texels."""
+
+
 class TextureAtlas(NamedTuple):
-    """Pictures one after another, each followed by its smaller levels, down to one texel.
+    """Pictures one after another, each followed by its smaller levels, down to one texel; WHITE and FLAT at the end.
 
     Attributes:
         texels: (n,) uint32 codes, red | green << 8 | blue << 16 | opacity << 24, row by row, row 0 of each
@@ -77,7 +84,7 @@ def build_atlas(readings: list[Reading]) -> tuple[TextureAtlas, dict[Reading, in
     rows: list[tuple[int, int, int, int, float, int, int]] = []
     row_of = {}
     start = 0
-    for reading in readings:
+    for reading in (*readings, WHITE, FLAT):
         row_of[reading] = len(rows)
         texture = reading.texture
         levels = _levels(texture, signed if reading.normals else linear, reading.normals)
@@ -87,8 +94,7 @@ def build_atlas(readings: list[Reading]) -> tuple[TextureAtlas, dict[Reading, in
             rows.append((start, width, height, len(levels), float(levels[0].size), *wraps))
             texels.append(level.ravel())
             start += level.size
-    pictures = np.array(rows, dtype=PICTURE) if rows else np.zeros(0, dtype=PICTURE)
-    return TextureAtlas(np.concatenate([*texels, np.zeros(1, np.uint32)]), pictures, linear, signed), row_of
+    return TextureAtlas(np.concatenate(texels), np.array(rows, dtype=PICTURE), linear, signed), row_of
 
 
 def _levels(texture: Texture, decoded: NDArray[np.float64], normals: bool) -> list[NDArray[np.uint32]]:

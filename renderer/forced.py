@@ -7,29 +7,24 @@ says; any other effect runs on every surface and, where nothing calls for it, br
 from __future__ import annotations
 
 import dataclasses
-import itertools
 
-import numpy as np
-
-from renderer.atlas import Reading, build_atlas
+from renderer.atlas import FLAT_ROW, WHITE_ROW
 from renderer.effect_choice import EffectChoice
 from renderer.effects import forced_plan
 from renderer.intersection import Intersector
-from renderer.material_table import calls_of, readings_of, used_materials
+from renderer.material_table import calls_of, used_materials
 from renderer.prepared import PreparedScene, Sieve, prepare
-from renderer.scene import Texture
 
 MOST_VARIANTS = 8
 """Variants of a scene that are kept; they are cheap to make."""
 
-WHITE = Reading(Texture(np.full((1, 1, 3), 255, dtype=np.uint8), "white"))
-FLAT = Reading(Texture(np.array([[[128, 128, 255]]], dtype=np.uint8), "flat"), normals=True)
-"""What surfaces without a texture, or without a normal map, look up where these are forced on."""
+CASTING = frozenset({"shadows", "soft_shadows"})
+"""Effects that have everything cast shadows where they are forced on."""
 
 LOOKED_UP = {
-    "textures": (("picture", "specular_picture"), WHITE),
-    "cutouts": (("alpha_picture",), WHITE),
-    "normal_maps": (("normal_picture",), FLAT),
+    "textures": (("picture", "specular_picture"), WHITE_ROW),
+    "cutouts": (("alpha_picture",), WHITE_ROW),
+    "normal_maps": (("normal_picture",), FLAT_ROW),
 }
 """Fields of the material table that name a texture, by effect, and what stands in for one."""
 
@@ -51,17 +46,12 @@ def _forced(prepared: PreparedScene, choice: EffectChoice) -> PreparedScene:
     surfaces, intersector = prepared.surfaces, prepared.intersector
     materials = surfaces.materials.copy()
     materials["calls"] = [calls_of(material, plan) for material in used_materials(prepared.scene)]
-    textures = surfaces.textures
-    if plan.forced & LOOKED_UP.keys():
-        used = used_materials(prepared.scene)
-        shown = itertools.chain(*(readings_of(material, prepared.plan) for material in used))
-        textures, picture = build_atlas([*dict.fromkeys(shown), WHITE, FLAT])
     for effect, (names, stand_in) in LOOKED_UP.items():
         for name in names:
             if effect not in plan.names:
                 materials[name] = -1
             elif effect in plan.forced:
-                materials[name][materials[name] == -1] = picture[stand_in]
+                materials[name][materials[name] == -1] = len(surfaces.textures.pictures) + stand_in
     lights, area_lights = surfaces.lights.copy(), surfaces.area_lights.copy()
     for table, effect in ((lights, "shadows"), (area_lights, "soft_shadows")):
         if effect not in plan.names:
@@ -69,14 +59,14 @@ def _forced(prepared: PreparedScene, choice: EffectChoice) -> PreparedScene:
         elif effect in plan.forced:
             table["casts"] = 1
     sieve = prepared.sieve
-    if plan.forced & {"shadows", "soft_shadows"}:
+    if plan.forced & CASTING:
         intersector, sieve = _all_casting(prepared)
     if sieve is not None:
-        sieve = sieve._replace(surfaces=sieve.surfaces._replace(materials=materials, textures=textures))
+        sieve = sieve._replace(surfaces=sieve.surfaces._replace(materials=materials, textures=surfaces.textures))
     return dataclasses.replace(
         prepared,
         plan=plan,
-        surfaces=surfaces._replace(materials=materials, lights=lights, area_lights=area_lights, textures=textures),
+        surfaces=surfaces._replace(materials=materials, lights=lights, area_lights=area_lights),
         intersector=intersector,
         sieve=sieve,
         variants={},
@@ -84,7 +74,10 @@ def _forced(prepared: PreparedScene, choice: EffectChoice) -> PreparedScene:
 
 
 def _all_casting(prepared: PreparedScene) -> tuple[Intersector, Sieve | None]:
-    """What answers rays where everything casts shadows."""
+    """What answers rays where everything casts shadows; variants share it, since it may hold all triangles again."""
+    for variant in list(prepared.variants.values()):
+        if variant.plan.forced & CASTING:
+            return variant.intersector, variant.sieve
     if "cutouts" not in prepared.plan.names:
         return prepared.intersector.all_casting(), None
     scene = prepared.scene

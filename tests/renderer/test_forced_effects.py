@@ -13,6 +13,7 @@ from renderer.camera import Camera
 from renderer.display import Display
 from renderer.effect_choice import EFFECTS, read_effect_choice, require_effect_choice
 from renderer.errors import SettingsError
+from renderer.forced import with_effects
 from renderer.frame import Frame, FrameRequest
 from renderer.gaze import Gaze
 from renderer.pipeline import Renderer
@@ -129,6 +130,18 @@ def hit_mask(scene: Scene) -> Scene:
     """White where rays hit something, black elsewhere."""
     lit = without(scene, diffuse=BLACK, emission=(1.0,) * 3)
     return dataclasses.replace(lit, lights=(), surroundings=Surroundings())
+
+
+def test_a_scene_with_effects_forced_shares_its_pictures_and_triangles() -> None:
+    """Requests decide how many such there are, and the bound on scenes knows nothing of them."""
+    prepared = prepare(everything())
+    textures = prepared.surfaces.textures
+    casting = [("+shadows",), ("+soft_shadows", "-textures"), ("+shadows", "+cutouts")]
+    forced = [with_effects(prepared, choice) for choice in [("+textures",), ("+cutouts",), ("+normal_maps",), *casting]]
+    assert all(variant.surfaces.textures is textures for variant in forced)
+    assert all(variant.sieve is not None and variant.sieve.surfaces.textures is textures for variant in forced)
+    first, *others = forced[-len(casting) :]
+    assert all(variant.intersector is first.intersector for variant in others)
 
 
 def test_every_effect_forced_on_traces_each_kind_of_ray(renderer: Renderer) -> None:
