@@ -138,7 +138,7 @@ def _decide(
     wanted: int,
     exposure: np.float32,
     thresholds: NDArray[np.float32],
-    first_codes: NDArray[np.uint8],
+    first_codes: NDArray[np.int32],
     until: NDArray[np.int32],
 ) -> None:
     """Write how many samples each chosen cell is to have next; see `Verdicts.next_round`."""

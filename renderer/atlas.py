@@ -109,7 +109,7 @@ def _levels(texture: Texture, decoded: NDArray[np.float64], normals: bool) -> li
 
 
 @formula
-def _code(value: float, normals: bool, thresholds: NDArray[np.float32], first_codes: NDArray[np.uint8]) -> int:
+def _code(value: float, normals: bool, thresholds: NDArray[np.float32], first_codes: NDArray[np.int32]) -> int:
     """The code of a mean."""
     if normals:
         return int(CODE_STEPS * value + CODE_STEPS + 0.5)
@@ -122,7 +122,7 @@ def shrink(
     decoded: NDArray[np.float64],
     normals: bool,
     thresholds: NDArray[np.float32],
-    first_codes: NDArray[np.uint8],
+    first_codes: NDArray[np.int32],
     smaller: NDArray[np.uint32],
 ) -> None:
     """Fill a picture with the mean linear light, or the mean normal, of a larger one over each of its texels.

@@ -158,7 +158,7 @@ def _lane_numbers(_context: Any, first: Any) -> Any:
 
 
 lane_numbers: Any = either(intrinsic(_lane_numbers), lambda first: first + np.arange(LANES))
-"""lane_numbers(first): first, first + 1, ... first + 7."""
+"""lane_numbers(first): first, first + 1, ... first + LANES - 1."""
 
 
 def _row_place(target: Any, builder: Any, room: Any, array: Any, row: Any, given: Any) -> Any:
@@ -183,7 +183,11 @@ held: Any = either(intrinsic(_held), lambda room, row: room[row].astype(np.float
 def _keep(_context: Any, room: Any, row: Any, value: Any) -> Any:
     def generate(target: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
         array, place, lanes = arguments
-        if isinstance(value, Lanes) and value.of == types.boolean:
+        if room.dtype == types.int32:
+            lanes = builder.trunc(
+                as_lanes(target, builder, lanes, value, types.int64), ir.VectorType(ir.IntType(32), LANES)
+            )
+        elif isinstance(value, Lanes) and value.of == types.boolean:
             lanes = builder.uitofp(lanes, vector(types.float64))
         else:
             lanes = as_lanes(target, builder, lanes, value, types.float64)
@@ -201,4 +205,5 @@ def _keep_plainly(room: Any, row: int, value: Any) -> None:
 
 
 keep: Any = either(intrinsic(_keep), _keep_plainly)
-"""keep(room, row, value): write numbers or marks, as 0 and 1, to a row of a (n, LANES) float64 or float32 array."""
+"""keep(room, row, value): write numbers, or marks as 0 and 1, to a row of a (n, LANES) float64 or float32 array, or
+whole numbers to one of int32."""

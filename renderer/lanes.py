@@ -1,4 +1,4 @@
-"""Eight numbers in one: lanes, with which a kernel does the same for eight rays at a time.
+"""Sixteen numbers in one: lanes, with which a kernel does the same for sixteen rays at a time.
 
 A formula that keeps to these functions and to + - * / & | and comparisons takes lanes as well as numbers, and each
 lane gets the very bits that the number alone would: nothing is contracted or reordered. In place of branches it
@@ -227,12 +227,32 @@ whole: Callable[[float], int] = either(
     _converted("fptosi", types.float64, types.int64), lambda x: np.asarray(x).astype(np.int64)[()]
 )
 """The integer next to a number, towards 0; it has to be within 2^63."""
-_bits: Callable[[float], int] = either(
+bits: Callable[[float], int] = either(
     _converted("bitcast", types.float64, types.int64), lambda x: np.float64(x).view(np.int64)
 )
+"""The bits of a float64."""
 _from_bits: Callable[[int], float] = either(
     _converted("bitcast", types.int64, types.float64), lambda n: np.int64(n).view(np.float64)
 )
+
+
+def _single(_context: Any, number: Any) -> Any:
+    lanes = isinstance(number, Lanes)
+    result = FLOATS if lanes else types.float64
+
+    def generate(target: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        (wide,) = alike(target, builder, arguments, [number], types.float64, lanes)
+        short = ir.VectorType(ir.FloatType(), LANES) if lanes else ir.FloatType()
+        return builder.fpext(builder.fptrunc(wide, short), wide.type)
+
+    return result(number), generate
+
+
+single: Callable[[float], float] = either(
+    intrinsic(_single), lambda x: np.asarray(x, np.float32).astype(np.float64)[()]
+)
+"""A number rounded to float32. After each + - * / or root of such numbers, these are what float32 would give (Figueroa
+1995)."""
 
 
 def _anywhere(_context: Any, mark: Any) -> Any:
@@ -311,11 +331,11 @@ def binary_logarithm(x: float) -> float:
     The exponent, and of the rest, from half the root of 2 to twice that, the series of artanh (Abramowitz and Stegun
     1964, 4.1.27).
     """
-    bits = _bits(x)
-    rest = _from_bits(bits & _FRACTION | _ONE)
+    held = bits(x)
+    rest = _from_bits(held & _FRACTION | _ONE)
     above = rest > math.sqrt(2.0)
     rest = choose(above, 0.5 * rest, rest)
-    exponent = (bits >> 52) - choose(above, 1022.0, 1023.0)
+    exponent = (held >> 52) - choose(above, 1022.0, 1023.0)
     t = (rest - 1.0) / (rest + 1.0)
     q = t * t
     series = 1.0 + q * (1 / 3 + q * (1 / 5 + q * (1 / 7 + q * (1 / 9 + q * (1 / 11 + q / 13)))))

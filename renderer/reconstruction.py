@@ -6,7 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.cellmap import CellMap
+from renderer.gather import entry, keep, lane_numbers, pick
 from renderer.kernel import kernel
+from renderer.lanes import LANES, least, single
 from renderer.store import Samples
 from renderer.tonemap import FIRST_CODES, THRESHOLDS, srgb_code
 from renderer.workers import Workers
@@ -14,7 +16,7 @@ from renderer.workers import Workers
 STRIP_ROWS = 64
 """Rows gathered together [px]."""
 
-STRIP_CELLS = 32_768
+STRIP_CELLS = 2048 * LANES
 """Cells averaged together."""
 
 
@@ -52,16 +54,17 @@ def reconstruct(
         pool.run(average, chunks)
         pool.run(spread, strips)
         return radiance
-    codes = np.empty(cell_map.cells, dtype=np.uint32)
+    codes = np.empty((-(-cell_map.cells // LANES), LANES), dtype=np.int32)
     picture = np.empty((height, width, 3), dtype=np.uint8)
 
     def expose(chunk: int) -> None:
         part = slice(chunk * STRIP_CELLS, (chunk + 1) * STRIP_CELLS)
-        _mean_codes(samples, slots[part], np.float32(exposure), THRESHOLDS, FIRST_CODES, codes[part])
+        rows = slice(part.start // LANES, part.stop // LANES)
+        _mean_codes(samples, slots[part], np.float32(exposure), THRESHOLDS, FIRST_CODES, codes[rows])
 
     def paint(strip: int) -> None:
         part = slice(strip * STRIP_ROWS, (strip + 1) * STRIP_ROWS)
-        _gather_codes(cell_map.mask[part], codes, picture[part])
+        _gather_codes(cell_map.mask[part], codes.ravel(), picture[part])
 
     pool.run(expose, chunks)
     pool.run(paint, strips)
@@ -92,18 +95,18 @@ def _mean_codes(
     slots: NDArray[np.int64],
     exposure: np.float32,
     thresholds: NDArray[np.float32],
-    first_codes: NDArray[np.uint8],
-    codes: NDArray[np.uint32],
+    first_codes: NDArray[np.int32],
+    codes: NDArray[np.int32],
 ) -> None:
-    """Exposed mean of each cell as red | green << 8 | blue << 16."""
+    """Exposed mean of each cell as red | green << 8 | blue << 16, LANES of them in a row of `codes`."""
     total, count = samples.total, samples.number
-    for cell in range(len(slots)):
-        slot = slots[cell]
-        share = exposure * (np.float32(1.0) / np.float32(count[slot]))
-        red = srgb_code(total[slot, 0] * share, thresholds, first_codes)
-        green = srgb_code(total[slot, 1] * share, thresholds, first_codes)
-        blue = srgb_code(total[slot, 2] * share, thresholds, first_codes)
-        codes[cell] = red | (green << 8) | (blue << 16)
+    for row in range(len(codes)):
+        slot = entry(slots, least(lane_numbers(row * LANES), len(slots) - 1))
+        share = single(np.float64(exposure) * single(1.0 / entry(count, slot)))
+        red = srgb_code(single(pick(total, slot, 0) * share), thresholds, first_codes)
+        green = srgb_code(single(pick(total, slot, 1) * share), thresholds, first_codes)
+        blue = srgb_code(single(pick(total, slot, 2) * share), thresholds, first_codes)
+        keep(codes, row, red + (green + blue * 256) * 256)
 
 
 @kernel
@@ -115,7 +118,7 @@ def _gather_radiance(mask: NDArray[np.int32], means: NDArray[np.float32], radian
 
 
 @kernel
-def _gather_codes(mask: NDArray[np.int32], codes: NDArray[np.uint32], picture: NDArray[np.uint8]) -> None:
+def _gather_codes(mask: NDArray[np.int32], codes: NDArray[np.int32], picture: NDArray[np.uint8]) -> None:
     for row in range(mask.shape[0]):
         for column in range(mask.shape[1]):
             code = codes[mask[row, column]]

@@ -124,7 +124,7 @@ def _paint_cells(
     last: int,
     linear: bool,
     thresholds: NDArray[np.float32],
-    first_codes: NDArray[np.uint8],
+    first_codes: NDArray[np.int32],
     radiance: NDArray[np.float32],
     picture: NDArray[np.uint8],
 ) -> None:

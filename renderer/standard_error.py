@@ -34,6 +34,9 @@ from renderer.workers import Workers
 FOVEA_DEG = 2.5
 """Half-angle of the fovea around the gaze [deg]."""
 
+ROUNDING_DEG = 0.01
+"""What a first, quick look adds to the fovea, so that it leaves out nothing of it."""
+
 NEIGHBOURS_SHARE = 0.25
 """Squared error of a cell's central sample over its mean squared difference from the cells around it. It is 0.5 where
 these have nothing to do with each other (each differs from its mean by their common variance, from each other by
@@ -96,10 +99,9 @@ def stated_error(
     def add(chunk: int) -> None:
         first = chunk * CHUNK_CELLS
         last = min(first + CHUNK_CELLS, cell_map.cells)
-        _sum_errors(
-            eye, cell_map.x, cell_map.y, cell_map.side, cell_map.mask, slots, samples, every, first, last,
-            sums[chunk],
-        )  # fmt: skip
+        cells = cell_map.x, cell_map.y, cell_map.side
+        _sum_errors(eye, *cells, slots, samples, first, last, sums[chunk])
+        _sum_guesses(eye, *cells, cell_map.mask, slots, samples, every, first, last, sums[chunk])
 
     pool.run(add, chunks)
     screen, area, fovea, foveal_area, guessed = (float(total) for total in sums.sum(axis=0))
@@ -108,6 +110,49 @@ def stated_error(
         exposure * math.sqrt(fovea / foveal_area) if foveal_area else None,
         guessed / area,
     )
+
+
+class _Fovea(NamedTuple):
+    """Where the fovea looks.
+
+    Attributes:
+        left, right, top, bottom: of a rectangle around it [px].
+        limit: least squared cosine of its angle to the gaze, times the squared distance of that from the eye [cm2].
+    """
+
+    left: float
+    right: float
+    top: float
+    bottom: float
+    limit: float
+
+
+@formula
+def _fovea_of(eye: EyeGeometry) -> _Fovea:
+    """The fovea on a screen. It reaches farthest outwards, away from where the eye is in front of the screen."""
+    from_foot2 = eye.gaze_x * eye.gaze_x + eye.gaze_y * eye.gaze_y
+    slant = math.atan(math.sqrt(from_foot2) / eye.distance)
+    outer = slant + math.radians(FOVEA_DEG + ROUNDING_DEG)
+    reach = eye.distance * (math.tan(outer) - math.tan(slant)) if outer < 0.5 * math.pi else math.inf
+    column, row = eye.gaze_x / eye.pitch_x + eye.width_px / 2, eye.gaze_y / eye.pitch_y + eye.height_px / 2
+    return _Fovea(
+        column - reach / eye.pitch_x,
+        column + reach / eye.pitch_x,
+        row - reach / eye.pitch_y,
+        row + reach / eye.pitch_y,
+        math.cos(math.radians(FOVEA_DEG)) ** 2 * (from_foot2 + eye.distance * eye.distance),
+    )
+
+
+@formula
+def _is_foveal(eye: EyeGeometry, fovea: _Fovea, column: float, row: float) -> bool:
+    """Whether a place of the screen [px] is within FOVEA_DEG of the gaze."""
+    if column < fovea.left or column > fovea.right or row < fovea.top or row > fovea.bottom:
+        return False
+    x, y = (column - eye.width_px / 2) * eye.pitch_x, (row - eye.height_px / 2) * eye.pitch_y
+    distance2 = eye.distance * eye.distance
+    along = x * eye.gaze_x + y * eye.gaze_y + distance2
+    return along > 0.0 and along * along >= fovea.limit * (x * x + y * y + distance2)
 
 
 @formula
@@ -132,6 +177,42 @@ def _sum_errors(
     x: NDArray[np.int32],
     y: NDArray[np.int32],
     sides: NDArray[np.int32],
+    slots: NDArray[np.int64],
+    samples: Samples,
+    first: int,
+    last: int,
+    sums: NDArray[np.float64],
+) -> None:
+    """Squared error times area and area of cells `first` to `last` - 1, those of cells in the fovea, and the area of
+    cells with one sample, whose error is left out, into `sums`, (5,).
+    """
+    shown, square, count = samples.shown, samples.square, samples.number
+    fovea = _fovea_of(eye)
+    screen = screen_area = foveal = foveal_area = guessed_area = 0.0
+    for cell in range(first, last):
+        slot, side = slots[cell], sides[cell]
+        number = count[slot]
+        area = float(side) * float(side)
+        error = 0.0
+        if number > 1:
+            mean = np.float64(shown[slot]) / number
+            error = area * max(0.0, np.float64(square[slot]) / number - mean * mean) / (number - 1)
+        else:
+            guessed_area += area
+        screen += error
+        screen_area += area
+        if _is_foveal(eye, fovea, x[cell] + 0.5 * side, y[cell] + 0.5 * side):
+            foveal += error
+            foveal_area += area
+    sums[0], sums[1], sums[2], sums[3], sums[4] = screen, screen_area, foveal, foveal_area, guessed_area
+
+
+@kernel
+def _sum_guesses(
+    eye: EyeGeometry,
+    x: NDArray[np.int32],
+    y: NDArray[np.int32],
+    sides: NDArray[np.int32],
     mask: NDArray[np.int32],
     slots: NDArray[np.int64],
     samples: Samples,
@@ -140,35 +221,14 @@ def _sum_errors(
     last: int,
     sums: NDArray[np.float64],
 ) -> None:
-    """Squared error times area and area of cells `first` to `last` - 1, those of cells in the fovea, and the area of
-    cells with one sample, into `sums`, (5,). Of the latter one in `every` speaks for the others.
-    """
-    shown, square, count = samples.shown, samples.square, samples.number
-    distance2 = eye.distance * eye.distance
-    limit = math.cos(math.radians(FOVEA_DEG)) ** 2
-    reach = limit * (eye.gaze_x * eye.gaze_x + eye.gaze_y * eye.gaze_y + distance2)
-    screen = screen_area = fovea = foveal_area = guessed_area = 0.0
-    spokesman = -(-first // every) * every
-    for cell in range(first, last):
+    """Add the squared error times area of cells with one sample. One cell in `every` speaks for the others."""
+    fovea = _fovea_of(eye)
+    for cell in range(-(-first // every) * every, last, every):
         slot, side = slots[cell], sides[cell]
-        number = count[slot]
-        area = float(side) * float(side)
-        error = 0.0
-        if number > 1:
-            mean = np.float64(shown[slot]) / number
-            error = max(0.0, np.float64(square[slot]) / number - mean * mean) / (number - 1)
-        else:
-            guessed_area += area
-            if cell >= spokesman:
-                spokesman = cell + every
-                around = _difference_around(x[cell], y[cell], side, np.float64(shown[slot]), mask, slots, samples)
-                error = every * NEIGHBOURS_SHARE * around
-        screen += error * area
-        screen_area += area
-        px_cm = (x[cell] + 0.5 * side - eye.width_px / 2) * eye.pitch_x
-        py_cm = (y[cell] + 0.5 * side - eye.height_px / 2) * eye.pitch_y
-        along = px_cm * eye.gaze_x + py_cm * eye.gaze_y + distance2
-        if along > 0.0 and along * along >= reach * (px_cm * px_cm + py_cm * py_cm + distance2):
-            fovea += error * area
-            foveal_area += area
-    sums[0], sums[1], sums[2], sums[3], sums[4] = screen, screen_area, fovea, foveal_area, guessed_area
+        if samples.number[slot] > 1:
+            continue
+        around = _difference_around(x[cell], y[cell], side, np.float64(samples.shown[slot]), mask, slots, samples)
+        error = every * NEIGHBOURS_SHARE * around * float(side) * float(side)
+        sums[0] += error
+        if _is_foveal(eye, fovea, x[cell] + 0.5 * side, y[cell] + 0.5 * side):
+            sums[2] += error

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.gather import entry
 from renderer.kernel import formula
+from renderer.lanes import bits, choose
 from renderer.texture import srgb_to_linear
 
 SMALLEST_STEP = 0.5 / 255 / 12.92
@@ -13,6 +17,9 @@ SMALLEST_STEP = 0.5 / 255 / 12.92
 
 LOWEST_EXPONENT = -13
 """2^-13 is below the first threshold, 0.5/255/12.92."""
+
+FRACTION_BITS, EXPONENT_OF_ONE = 52, 1023
+"""Of a float64."""
 
 STEPS_PER_OCTAVE = 256
 """Entries of the table for each power of two: fine enough that none holds two thresholds."""
@@ -25,12 +32,12 @@ def _thresholds() -> NDArray[np.float32]:
     return edges.astype(np.float32)
 
 
-def _first_codes() -> NDArray[np.uint8]:
-    """Code at the lower end of each table entry."""
+def _first_codes() -> NDArray[np.int32]:
+    """Code at the lower end of each table entry; as int32, which lanes read at once."""
     octaves = -LOWEST_EXPONENT
     value = 2.0**LOWEST_EXPONENT * 2.0 ** (np.arange(octaves * STEPS_PER_OCTAVE) // STEPS_PER_OCTAVE)
     value *= 1 + (np.arange(octaves * STEPS_PER_OCTAVE) % STEPS_PER_OCTAVE) / STEPS_PER_OCTAVE
-    return (np.searchsorted(THRESHOLDS, value.astype(np.float32), side="right") - 1).astype(np.uint8)
+    return (np.searchsorted(THRESHOLDS, value.astype(np.float32), side="right") - 1).astype(np.int32)
 
 
 THRESHOLDS = _thresholds()
@@ -44,17 +51,15 @@ def encode_srgb(linear: NDArray[np.floating]) -> NDArray[np.uint8]:
 
 
 @formula
-def srgb_code(value: np.float32, thresholds: NDArray[np.float32], first_codes: NDArray[np.uint8]) -> int:
+def srgb_code(value: Any, thresholds: NDArray[np.float32], first_codes: NDArray[np.int32]) -> Any:
     """8-bit sRGB code of one linear value: table entry by its exponent and leading bits, then the next threshold.
 
     Args:
-        value: float32, any; NaN and negative values become 0.
+        value: one that float32 can hold, or lanes of such; NaN and negative values become 0.
         thresholds, first_codes: THRESHOLDS and FIRST_CODES.
     """
-    if not value >= thresholds[1]:
-        return 0
-    if value >= thresholds[255]:
-        return 255
-    entry = (np.float32(value).view(np.int32) >> 15) - ((LOWEST_EXPONENT + 127) << 8)
-    code = int(first_codes[entry])
-    return code + 1 if value >= thresholds[code + 1] else code
+    lit, white = value >= thresholds[1], value >= thresholds[255]
+    between = choose(lit & (value < thresholds[255]), value, thresholds[1])
+    code = entry(first_codes, (bits(between) >> FRACTION_BITS - 8) - ((LOWEST_EXPONENT + EXPONENT_OF_ONE) << 8))
+    code = code + choose(between >= entry(thresholds, code + 1), 1, 0)
+    return choose(white, 255, choose(lit, code, 0))

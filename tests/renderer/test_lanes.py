@@ -26,6 +26,7 @@ from renderer.lanes import (
     natural_logarithm,
     power,
     root,
+    single,
     size,
     whole,
 )
@@ -58,6 +59,7 @@ def arithmetic_in_lanes(x: NDArray[np.float64], y: NDArray[np.float64], out: NDA
     keep(out, 14, (lane * 5 >> 1) & 6)
     keep(out, 15, choose(anywhere(a > b), 1.0, 0.0))
     keep(out, 16, held(out, 4) == held(out, 5))
+    keep(out, 17, single(a) * single(b))
 
 
 @kernel
@@ -84,6 +86,7 @@ def arithmetic_of_numbers(x: NDArray[np.float64], y: NDArray[np.float64], out: N
         out[14, lane] = (lane * 5 >> 1) & 6
         out[15, lane] = 1.0 if greater else 0.0
         out[16, lane] = 1.0 if out[4, lane] == out[5, lane] else 0.0
+        out[17, lane] = np.float64(np.float32(a)) * np.float64(np.float32(b))
 
 
 @given(numbers, numbers)

@@ -7,19 +7,27 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from renderer.acuity import Acuity
 from renderer.camera import Camera
+from renderer.cellmap import build_cell_map
 from renderer.display import Display
+from renderer.eccentricity import eccentricity_deg
 from renderer.frame import FrameRequest
-from renderer.gaze import Gaze
+from renderer.gaze import Gaze, GazeBucket
 from renderer.pipeline import Renderer
 from renderer.prepared import prepare
 from renderer.quality import Quality
 from renderer.scene import Material, Scene, Surroundings, Texture
+from renderer.standard_error import stated_error
+from renderer.store import SampleStore, slots_of
+from renderer.workers import WorkerPool
 from tests.renderer.drawing import EVERYWHERE_1, WHITE, floor, shoot
 
 SCREEN = Display(96, 64, width_cm=8.0)
+FOVEA_DEG = 2.5
 
 
 def request(gaze: tuple[float, float], quality: Quality, display: Display) -> FrameRequest:
@@ -68,3 +76,33 @@ def test_the_foveal_error_is_that_of_the_cells_around_the_gaze(renderer: Rendere
     assert noisy.foveal_rms_error > 0.05
     away = renderer.render(prepared, request((1e7, 0), quality, display)).cost
     assert away.foveal_rms_error is None
+
+
+@given(
+    st.tuples(st.floats(-300.0, 400.0), st.floats(-300.0, 400.0)),
+    st.floats(1.0, 400.0),
+    st.floats(1.0, 400.0),
+    st.floats(1.0, 100.0),
+)
+def test_the_fovea_is_all_within_its_angle_of_the_gaze(
+    pool: WorkerPool, gaze: tuple[float, float], width_cm: float, height_cm: float, distance_cm: float
+) -> None:
+    """However obliquely the eye looks: cells of a pixel, each with an error of its own, weighed as that angle says."""
+    display = Display(48, 32, width_cm, height_cm, distance_cm)
+    rng = np.random.default_rng(5)
+    store = SampleStore(display.pixels)
+    mean, error = rng.uniform(0.0, 1.0, (2, display.pixels))
+    store.samples.number[:] = 2
+    store.samples.shown[:], store.samples.square[:] = 2.0 * mean, 2.0 * (mean * mean + error)
+    cells = build_cell_map("full", display, Acuity(), GazeBucket(0.0, 0.0, 16), pool)
+    slots = slots_of(cells, pool)
+    stated = stated_error(display, Gaze(*gaze), cells, slots, store.samples, 1.0, pool)
+    angle = eccentricity_deg(display, Gaze(*gaze)).ravel()
+    if np.abs(angle - FOVEA_DEG).min() < 1e-6:
+        return
+    within = error[angle < FOVEA_DEG]
+    if len(within):
+        assert stated.foveal_rms == pytest.approx(math.sqrt(within.mean()), rel=1e-4)
+    else:
+        assert stated.foveal_rms is None
+    assert stated.rms == pytest.approx(math.sqrt(error.mean()), rel=1e-4)

@@ -6,6 +6,9 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.gather import entry, keep, lane_numbers
+from renderer.kernel import kernel
+from renderer.lanes import LANES, least
 from renderer.texture import srgb_to_linear
 from renderer.tonemap import FIRST_CODES, THRESHOLDS, encode_srgb, srgb_code
 from tests.renderer.texel import srgb_of
@@ -13,12 +16,24 @@ from tests.renderer.texel import srgb_of
 
 @numba.njit
 def kernel_codes(
-    values: NDArray[np.float32], thresholds: NDArray[np.float32], first_codes: NDArray[np.uint8]
+    values: NDArray[np.float32], thresholds: NDArray[np.float32], first_codes: NDArray[np.int32]
 ) -> NDArray[np.int64]:
     codes = np.zeros(len(values), dtype=np.int64)
     for index in range(len(values)):
         codes[index] = srgb_code(values[index], thresholds, first_codes)
     return codes
+
+
+@kernel
+def codes_in_lanes(
+    values: NDArray[np.float32],
+    thresholds: NDArray[np.float32],
+    first_codes: NDArray[np.int32],
+    codes: NDArray[np.int32],
+) -> None:
+    for row in range(len(codes)):
+        value = entry(values, least(lane_numbers(row * LANES), len(values) - 1))
+        keep(codes, row, srgb_code(value, thresholds, first_codes))
 
 
 def test_a_code_is_the_rounded_curve_everywhere() -> None:
@@ -50,3 +65,6 @@ def test_the_kernel_is_the_plain_search() -> None:
     values = np.concatenate([bits, spread, edges, octaves, np.nextafter(octaves, -inf), special])
     with np.errstate(invalid="ignore"):
         np.testing.assert_array_equal(kernel_codes(values, THRESHOLDS, FIRST_CODES), encode_srgb(values))
+    codes = np.empty((-(-len(values) // LANES), LANES), dtype=np.int32)
+    codes_in_lanes(values, THRESHOLDS, FIRST_CODES, codes)
+    np.testing.assert_array_equal(codes.ravel()[: len(values)], encode_srgb(values))
