@@ -3,23 +3,35 @@
 The discriminant is taken from the distance between the ray and the centre instead of from b^2 - 4ac,
 and the second root from the product of the roots (Haines, Gunther and Akenine-Moller, Ray Tracing
 Gems, 2019, ch. 7), so that far and large spheres keep their shape.
+
+LANES rays go down the tree together, to every node that one of them enters. Of two spheres at the very same distance
+the lower number is met.
 """
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.gather import entry, held, keep, lane_numbers, pick
 from renderer.kernel import formula, roomy_kernel
+from renderer.lanes import LANES, anywhere, choose, least, most, root
 
 LEAF_SPHERES = 4
 """Most spheres in a leaf of the tree."""
 
 STACK_SIZE = 64
 """Pending nodes of a traversal: the tree halves its spheres, so 2^63 spheres would fit."""
+
+BEYOND = 1.0 + 2.0**-30
+"""The search goes on a little beyond the nearest hit: far more than the rounding of a box, so that no equal hit is
+passed over, and what a ray meets does not depend on the rays beside it."""
+
+NEAREST, FOUND = 0, 1
+"""Rows of what LANES rays have met: how far away, and which sphere."""
 
 
 class SphereTree(NamedTuple):
@@ -100,99 +112,121 @@ def build_sphere_tree(
 def hit_distance(
     ox: float, oy: float, oz: float, dx: float, dy: float, dz: float, cx: float, cy: float, cz: float, radius: float
 ) -> float:
-    """Smallest t > 0 at which o + t*d meets the sphere, infinity if none; d need not be of unit length."""
+    """Smallest t > 0 at which o + t*d meets the sphere, infinity if none; d need not be of unit length.
+
+    Args:
+        ox, oy, oz, dx, dy, dz: the ray, in numbers or lanes.
+        cx, cy, cz, radius: the sphere.
+    """
     fx, fy, fz = ox - cx, oy - cy, oz - cz
     a = dx * dx + dy * dy + dz * dz
     b = -(fx * dx + fy * dy + fz * dz)
     step = b / a
     lx, ly, lz = fx + step * dx, fy + step * dy, fz + step * dz
     spare = radius * radius - (lx * lx + ly * ly + lz * lz)
-    if not spare >= 0.0:
-        return math.inf
-    root = math.sqrt(a * spare)
-    q = b + root if b >= 0.0 else b - root
-    far = math.sqrt(fx * fx + fy * fy + fz * fz)
+    meets = spare >= 0.0
+    half = root(a * choose(meets, spare, 0.0))
+    q = choose(b >= 0.0, b + half, b - half)
+    far = root(fx * fx + fy * fy + fz * fz)
     c = (far - radius) * (far + radius)
-    near, other = (c / q if q != 0.0 else math.inf), q / a
-    low, high = min(near, other), max(near, other)
-    if low > 0.0:
-        return low
-    return high if high > 0.0 else math.inf
+    near, other = choose(q != 0.0, c / choose(q != 0.0, q, 1.0), math.inf), q / a
+    low, high = least(near, other), most(near, other)
+    return choose(meets, choose(low > 0.0, low, choose(high > 0.0, high, math.inf)), math.inf)
+
+
+class _Group(NamedTuple):
+    """LANES rays.
+
+    Attributes:
+        ox, oy, oz: origin.
+        dx, dy, dz: direction.
+        ix, iy, iz: its reciprocals.
+    """
+
+    ox: Any
+    oy: Any
+    oz: Any
+    dx: Any
+    dy: Any
+    dz: Any
+    ix: Any
+    iy: Any
+    iz: Any
 
 
 @formula
-def _box_entry(
-    ox: float, oy: float, oz: float, ix: float, iy: float, iz: float, box: NDArray[np.float64], node: int, limit: float
-) -> float:
-    """Where a ray enters a node's box, infinity if it misses it or enters beyond `limit`.
+def _group_of(origin: NDArray[np.float32], direction: NDArray[np.float32], row: Any) -> _Group:
+    """The rays of some rows."""
+    dx, dy, dz = pick(direction, row, 0), pick(direction, row, 1), pick(direction, row, 2)
+    return _Group(
+        pick(origin, row, 0), pick(origin, row, 1), pick(origin, row, 2), dx, dy, dz, 1.0 / dx, 1.0 / dy, 1.0 / dz
+    )
+
+
+@formula
+def _between(box: NDArray[np.float64], node: int, axis: int, o: Any, i: Any, enter: Any, leave: Any) -> tuple[Any, Any]:
+    """Where rays are between two sides of a node's box: no sooner than `enter`, no later than `leave`.
 
     A direction component of 0 has an infinite reciprocal; an origin on the face then gives NaN, which
-    the comparisons below take as inside.
+    the comparisons take as inside.
     """
-    enter, leave = 0.0, limit
-    for axis in range(3):
-        o = ox if axis == 0 else (oy if axis == 1 else oz)
-        i = ix if axis == 0 else (iy if axis == 1 else iz)
-        near, far = (box[node, axis] - o) * i, (box[node, axis + 3] - o) * i
-        if near > far:
-            near, far = far, near
-        if near > enter:
-            enter = near
-        if far < leave:
-            leave = far
-    return enter if enter <= leave else math.inf
+    one, other = (box[node, axis] - o) * i, (box[node, axis + 3] - o) * i
+    near, far = choose(one > other, other, one), choose(one > other, one, other)
+    return choose(near > enter, near, enter), choose(far < leave, far, leave)
+
+
+@formula
+def _box_entry(rays: _Group, box: NDArray[np.float64], node: int, limit: Any) -> Any:
+    """Where rays enter a node's box, infinity if they miss it or enter beyond `limit`."""
+    enter, leave = choose(limit >= 0.0, 0.0, 0.0), limit * BEYOND
+    enter, leave = _between(box, node, 0, rays.ox, rays.ix, enter, leave)
+    enter, leave = _between(box, node, 1, rays.oy, rays.iy, enter, leave)
+    enter, leave = _between(box, node, 2, rays.oz, rays.iz, enter, leave)
+    return choose(enter <= leave, enter, math.inf)
 
 
 @formula
 def _next_leaf(
-    box: NDArray[np.float64],
-    firsts: NDArray[np.int32],
-    lengths: NDArray[np.int32],
-    ox: float,
-    oy: float,
-    oz: float,
-    ix: float,
-    iy: float,
-    iz: float,
-    limit: float,
-    nodes: NDArray[np.int32],
-    entries: NDArray[np.float64],
-    pending: int,
-) -> tuple[int, int]:
-    """Go on to the next leaf that a ray enters before `limit`, the nearer child of a node first.
+    tree: SphereTree, rays: _Group, limit: Any, nodes: NDArray[np.int32], entries: NDArray[np.float64], pending: int
+) -> int:
+    """Go on to the next leaf that one of some rays enters before its `limit`, the nearer child of a node first.
 
     Args:
-        box, firsts, lengths: of the tree.
-        ox, oy, oz, ix, iy, iz: origin and reciprocal direction of the ray.
-        limit: how far to look.
-        nodes, entries: (STACK_SIZE,) nodes to be visited and where the ray enters them, the last one next.
+        tree: the spheres.
+        rays: LANES of them.
+        limit: how far each looks.
+        nodes, entries: (STACK_SIZE,) nodes to be visited, and (STACK_SIZE, LANES) where the rays enter them, the last
+            one next.
         pending: how many there are.
 
     Returns:
-        The leaf, or -1, and how many nodes are pending then.
+        How many nodes are pending then, the leaf among them as the last; 0 if there is none.
     """
+    box, firsts, lengths = tree.box, tree.first, tree.length
     while pending > 0:
-        pending -= 1
-        node = nodes[pending]
-        if entries[pending] > limit:
-            continue
-        while lengths[node] == 0:
-            near = firsts[node]
-            far = near + 1
-            entry = _box_entry(ox, oy, oz, ix, iy, iz, box, near, limit)
-            other = _box_entry(ox, oy, oz, ix, iy, iz, box, far, limit)
-            if other < entry:
-                near, far, entry, other = far, near, other, entry
-            if entry == math.inf:
-                node = -1
-                break
-            if other < math.inf:
-                nodes[pending], entries[pending] = far, other
-                pending += 1
-            node = near
-        if node >= 0:
-            return node, pending
-    return -1, 0
+        node, enter = nodes[pending - 1], held(entries, pending - 1)
+        if not anywhere((enter < math.inf) & (enter <= limit * BEYOND)):
+            pending -= 1
+        elif lengths[node] > 0:
+            return pending
+        else:
+            near, far = firsts[node], firsts[node] + 1
+            enter, other = _box_entry(rays, box, near, limit), _box_entry(rays, box, far, limit)
+            if anywhere(other < enter):
+                near, far, enter, other = far, near, other, enter
+            nodes[pending - 1], nodes[pending] = far, near
+            keep(entries, pending - 1, other)
+            keep(entries, pending, enter)
+            pending += 1
+    return 0
+
+
+@formula
+def _within(tree: SphereTree, rays: _Group, sphere: int) -> Any:
+    """Where rays meet a sphere, infinity if they do not."""
+    center = tree.center
+    cx, cy, cz = center[sphere, 0], center[sphere, 1], center[sphere, 2]
+    return hit_distance(rays.ox, rays.oy, rays.oz, rays.dx, rays.dy, rays.dz, cx, cy, cz, tree.radius[sphere])
 
 
 @roomy_kernel
@@ -213,30 +247,31 @@ def nearest_spheres(
         distance: (n,) float32 distance of the nearest hit so far, in lengths of the direction.
         primitive: (n,) int32 what was hit, -1 for nothing.
     """
-    box, firsts, lengths = tree.box, tree.first, tree.length
-    centers, radii = tree.center, tree.radius
-    nodes, entries = np.zeros(STACK_SIZE, dtype=np.int32), np.zeros(STACK_SIZE)
-    for ray in range(len(distance)):
-        ox, oy, oz = np.float64(origin[ray, 0]), np.float64(origin[ray, 1]), np.float64(origin[ray, 2])
-        dx, dy, dz = np.float64(direction[ray, 0]), np.float64(direction[ray, 1]), np.float64(direction[ray, 2])
-        ix, iy, iz = 1.0 / dx, 1.0 / dy, 1.0 / dz
-        best = np.float64(distance[ray]) if primitive[ray] >= 0 else math.inf
-        found = -1
-        nodes[0], entries[0] = 0, _box_entry(ox, oy, oz, ix, iy, iz, box, 0, best)
-        leaf, pending = 0, min(1, len(radii))
-        while True:
-            leaf, pending = _next_leaf(box, firsts, lengths, ox, oy, oz, ix, iy, iz, best, nodes, entries, pending)
-            if leaf < 0:
-                break
+    firsts, lengths, n = tree.first, tree.length, len(distance) if len(tree.radius) > 0 else 0
+    nodes, entries = np.zeros(STACK_SIZE, dtype=np.int32), np.zeros((STACK_SIZE, LANES))
+    met = np.zeros((2, LANES))
+    for first in range(0, n, LANES):
+        row = least(lane_numbers(first), n - 1)
+        rays = _group_of(origin, direction, row)
+        best = choose(entry(primitive, row) >= 0, entry(distance, row), math.inf)
+        found = choose(best >= 0.0, -1, -1)
+        nodes[0] = 0
+        keep(entries, 0, _box_entry(rays, tree.box, 0, best))
+        pending = _next_leaf(tree, rays, best, nodes, entries, 1)
+        while pending > 0:
+            leaf = nodes[pending - 1]
+            enters = held(entries, pending - 1) < math.inf
             for sphere in range(firsts[leaf], firsts[leaf] + lengths[leaf]):
-                cx, cy, cz = centers[sphere, 0], centers[sphere, 1], centers[sphere, 2]
-                t = hit_distance(ox, oy, oz, dx, dy, dz, cx, cy, cz, radii[sphere])
-                if t < best:
-                    best = t
-                    found = sphere
-        if found >= 0:
-            distance[ray] = best
-            primitive[ray] = first_id + found
+                t = _within(tree, rays, sphere)
+                nearer = enters & ((t < best) | ((t == best) & (sphere < found)))
+                best, found = choose(nearer, t, best), choose(nearer, sphere, found)
+            pending = _next_leaf(tree, rays, best, nodes, entries, pending - 1)
+        if anywhere(found >= 0):
+            keep(met, NEAREST, best)
+            keep(met, FOUND, found)
+            for ray in range(first, min(first + LANES, n)):
+                if met[FOUND, ray - first] >= 0.0:
+                    distance[ray], primitive[ray] = met[NEAREST, ray - first], first_id + int(met[FOUND, ray - first])
 
 
 @roomy_kernel
@@ -255,25 +290,27 @@ def shade_spheres(
         reach: (n,) float32 distance of the light, in lengths of the direction.
         blocked: (n,) uint8, set to 1 where a sphere stands before the light; rays already 1 are skipped.
     """
-    box, firsts, lengths = tree.box, tree.first, tree.length
-    centers, radii, casts = tree.center, tree.radius, tree.casts
-    nodes, entries = np.zeros(STACK_SIZE, dtype=np.int32), np.zeros(STACK_SIZE)
-    for ray in range(len(reach)):
-        if blocked[ray] != 0:
-            continue
-        ox, oy, oz = np.float64(origin[ray, 0]), np.float64(origin[ray, 1]), np.float64(origin[ray, 2])
-        dx, dy, dz = np.float64(direction[ray, 0]), np.float64(direction[ray, 1]), np.float64(direction[ray, 2])
-        ix, iy, iz = 1.0 / dx, 1.0 / dy, 1.0 / dz
-        limit = np.float64(reach[ray])
-        nodes[0], entries[0] = 0, _box_entry(ox, oy, oz, ix, iy, iz, box, 0, limit)
-        leaf, pending = 0, min(1, len(radii))
-        while blocked[ray] == 0:
-            leaf, pending = _next_leaf(box, firsts, lengths, ox, oy, oz, ix, iy, iz, limit, nodes, entries, pending)
-            if leaf < 0:
-                break
+    firsts, lengths, casts, n = tree.first, tree.length, tree.casts, len(reach) if len(tree.radius) > 0 else 0
+    nodes, entries = np.zeros(STACK_SIZE, dtype=np.int32), np.zeros((STACK_SIZE, LANES))
+    met = np.zeros((1, LANES))
+    for first in range(0, n, LANES):
+        row = least(lane_numbers(first), n - 1)
+        rays = _group_of(origin, direction, row)
+        limit = choose(entry(blocked, row) == 0, entry(reach, row), -math.inf)
+        hidden = choose(limit >= 0.0, 0, 0)
+        nodes[0] = 0
+        keep(entries, 0, _box_entry(rays, tree.box, 0, limit))
+        pending = _next_leaf(tree, rays, limit, nodes, entries, 1)
+        while pending > 0:
+            leaf = nodes[pending - 1]
+            enters = held(entries, pending - 1) < math.inf
             for sphere in range(firsts[leaf], firsts[leaf] + lengths[leaf]):
-                cx, cy, cz = centers[sphere, 0], centers[sphere, 1], centers[sphere, 2]
-                t = hit_distance(ox, oy, oz, dx, dy, dz, cx, cy, cz, radii[sphere])
-                if t < limit and casts[sphere] != 0:
+                if casts[sphere] != 0:
+                    hits = enters & (_within(tree, rays, sphere) < limit)
+                    hidden, limit = choose(hits, 1, hidden), choose(hits, -math.inf, limit)
+            pending = _next_leaf(tree, rays, limit, nodes, entries, pending - 1)
+        if anywhere(hidden > 0):
+            keep(met, 0, hidden)
+            for ray in range(first, min(first + LANES, n)):
+                if met[0, ray - first] != 0.0:
                     blocked[ray] = 1
-                    break

@@ -65,6 +65,23 @@ def test_the_tree_finds_what_trying_every_sphere_finds(seed: int, count: int) ->
         assert every[ray, found[ray]] == truth[ray]
 
 
+@given(st.integers(0, 2**32), st.integers(1, 80))
+def test_a_ray_meets_the_same_sphere_whatever_goes_beside_it(seed: int, count: int) -> None:
+    """Of spheres that coincide too: in any order of the rays, and each of them alone."""
+    center, radius = random_spheres(seed, count)
+    tree = tree_of(center, radius)
+    rng = np.random.default_rng(seed + 3)
+    origin, direction = rng.uniform(-5, 5, (40, 3)), rng.normal(size=(40, 3))
+    origin[:8] = center[:1] + (0, 0, 9)
+    direction[:8] = (0, 0, -1)
+    distance, found = nearest(tree, origin, direction)
+    order = rng.permutation(40)
+    for some in (order, *np.arange(40).reshape(-1, 1)):
+        at, met = nearest(tree, origin[some], direction[some])
+        np.testing.assert_array_equal(met, found[some])
+        np.testing.assert_array_equal(at, distance[some])
+
+
 @given(st.integers(0, 2**32), st.integers(0, 60))
 def test_shadows_of_spheres_are_what_trying_every_sphere_finds(seed: int, count: int) -> None:
     center, radius = random_spheres(seed, count)
