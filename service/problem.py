@@ -104,9 +104,21 @@ def _at_once(answer: Answer) -> Callable[[Request, Exception], Awaitable[Respons
     """`answer` on the event loop: a thread for it could be cancelled when the service stops, and the answer lost."""
 
     async def answer_at_once(request: Request, error: Exception) -> Response:
-        return answer(request, error)
+        try:
+            return answer(request, error)
+        finally:
+            if isinstance(error, HTTPException | RequestValidationError):
+                _part_from_frames(error)
 
     return answer_at_once
+
+
+def _part_from_frames(error: Exception) -> None:
+    """Forget where an error comes from: FastAPI's frame that raised it for a damaged body holds it, and it the frame.
+
+    Together they would stay, with all of the body, until Python looks for garbage.
+    """
+    error.__traceback__ = error.__cause__ = error.__context__ = None
 
 
 def _later(detail: str, kind: str) -> Response:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import contextlib
+import gc
 import json
 from collections.abc import Callable, Iterator
 from typing import Any
 
 import httpx
 import pytest
+from fastapi.exceptions import RequestValidationError
+from starlette.exceptions import HTTPException
 
 from service.settings import Settings
 from tests.service.conftest import BROKEN_SCENE
@@ -104,6 +107,20 @@ def test_what_is_no_json_at_all_is_refused(client: httpx.Client, body: bytes) ->
     assert reply.status_code in (400, 422)
     assert reply.headers["content-type"] == "application/problem+json"
     assert len(reply.json()["detail"]) < 300
+
+
+def test_a_damaged_body_leaves_no_garbage(client: httpx.Client) -> None:
+    """It would hold the body until garbage is looked for."""
+    gc.collect()
+    gc.disable()
+    try:
+        for body in (b"{", b"\xff", b"no JSON"):
+            expect_problem(post(client, body), 422, "invalid-request", "body")
+        client.get("/v1/scenes")
+        left = [thing for thing in gc.get_objects() if type(thing) in (RequestValidationError, HTTPException)]
+    finally:
+        gc.enable()
+    assert not left
 
 
 def test_a_body_that_is_not_called_json_is_refused(client: httpx.Client) -> None:
