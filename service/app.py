@@ -50,6 +50,7 @@ def create_app(
     clock: Callable[[], int] = time.monotonic_ns,
     survey: Survey | None = None,
     watch: Watch | None = None,
+    settled: Callable[[], None] = lambda: None,
 ) -> FastAPI:
     """The application.
 
@@ -60,6 +61,7 @@ def create_app(
         clock: of the sessions, monotonic [ns].
         survey: what is measured of a scene in idle time; None for the usual.
         watch: over its scenes; None where nothing is known of them, nor kept.
+        settled: called when the kernels are compiled, just before frames can be rendered.
     """
 
     @asynccontextmanager
@@ -80,7 +82,7 @@ def create_app(
             Surveyor(studio, survey or Survey(), own.threads),
         )
         app.state.desk = desk
-        desk.studio.warm_up(announce)
+        desk.studio.warm_up(announce, settled)
         desk.sessions.open()
         yield
         desk.studio.close()

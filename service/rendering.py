@@ -143,8 +143,8 @@ class Studio:
         self._closed = False
         self._libraries = library_versions()
 
-    def warm_up(self, announce: Callable[[str], None]) -> threading.Thread:
-        """Compile or load the kernels on a thread of its own, and be ready when it ends."""
+    def warm_up(self, announce: Callable[[str], None], settled: Callable[[], None]) -> threading.Thread:
+        """Compile or load the kernels on a thread of its own, and be ready when it ends; `settled` is called before."""
 
         def compile_kernels() -> None:
             started = time.monotonic()
@@ -159,6 +159,7 @@ class Studio:
                 self._not_ready = f"the kernels cannot be compiled: {' '.join(str(error).split())[:LONGEST_REASON]}"
                 announce(self._not_ready)
                 return
+            settled()
             self._not_ready = None
             announce(f"ready in {time.monotonic() - started:.1f} s")
 

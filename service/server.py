@@ -11,6 +11,7 @@ from fastapi import FastAPI
 
 from service.app import create_app
 from service.connection import connection_of, drop
+from service.garbage import set_aside_what_stays
 from service.settings import Settings
 from service.stream_connection import stream_connection_of
 from service.watch import Watch
@@ -20,7 +21,7 @@ GOODBYE_S = 4
 
 
 def run(settings: Settings, listener: socket.socket, announce: Callable[[str], None], watch: Watch) -> None:
-    """Serve until stopped (Ctrl-C or SIGTERM).
+    """Serve until stopped (Ctrl-C or SIGTERM), in a process that does nothing else.
 
     Args:
         settings: limits and access.
@@ -28,7 +29,8 @@ def run(settings: Settings, listener: socket.socket, announce: Callable[[str], N
         announce: receives a line when the kernels begin to compile and one when frames can be rendered.
         watch: over its scenes.
     """
-    server = Server(create_app(settings, announce=announce, watch=watch), settings)
+    app = create_app(settings, announce=announce, watch=watch, settled=set_aside_what_stays)
+    server = Server(app, settings)
     with contextlib.suppress(KeyboardInterrupt):
         server.run(sockets=[listener])
 
