@@ -42,20 +42,18 @@ def use(service: ServiceProcess) -> None:
 WATCH_S = 0.25
 """Between two looks at the memory."""
 
-WARM_UP_SHARE = 0.25
-"""Of what was sent, before memory is held to anything: pools begin their threads, caches fill."""
-
 
 class Watch:
     """The memory of a service while something is sent to it; looked at by a thread, until the block ends.
 
     Args:
-        service: attacked.
+        held: bytes that the service has in use, or resident.
         sent: how much was sent by now.
+        warm_up: how much is sent before memory is held to anything.
     """
 
-    def __init__(self, service: ServiceProcess, sent: Callable[[], int]) -> None:
-        self._service, self._sent = service, sent
+    def __init__(self, held: Callable[[], int], sent: Callable[[], int], warm_up: int) -> None:
+        self._held, self._sent, self._warm_up = held, sent, warm_up
         self._series: list[tuple[int, int]] = []
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._look)
@@ -71,12 +69,12 @@ class Watch:
     @property
     def growth(self) -> Growth:
         """Of the memory, for each of what was sent after the warm-up."""
-        settled = [each for each in self._series if each[0] >= WARM_UP_SHARE * self._series[-1][0]]
+        settled = [each for each in self._series if each[0] >= self._warm_up]
         return growth_of([sent for sent, _ in settled], [held for _, held in settled])
 
     def _look(self) -> None:
         while not self._over.wait(WATCH_S):
-            self._series.append((self._sent(), self._service.resident_bytes))
+            self._series.append((self._sent(), self._held()))
 
 
 class Before:

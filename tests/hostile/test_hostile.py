@@ -6,11 +6,12 @@ from collections.abc import Iterator
 
 import pytest
 
+from tests.hostile.in_use import watched_process
 from tests.hostile.odd_names import ask_odd_names
 from tests.hostile.requests import ask
 from tests.hostile.state import FLAGS, Before
 from tests.hostile.stream import attack
-from tests.service.process import ServiceProcess, service_process
+from tests.service.process import ServiceProcess
 
 CASES = 200
 MESSAGES = 1500
@@ -18,8 +19,9 @@ MESSAGES = 1500
 
 @pytest.fixture(scope="module")
 def service() -> Iterator[ServiceProcess]:
-    with service_process(*FLAGS) as service:
+    with watched_process(*FLAGS) as (service, in_use):
         yield service
+        assert 10 << 20 < in_use() < service.resident_bytes
 
 
 def test_every_reply_to_a_request_made_up_is_one_that_is_promised(service: ServiceProcess) -> None:
