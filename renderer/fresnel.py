@@ -1,10 +1,9 @@
-"""Reflection and refraction at a smooth boundary: Snell's law and Fresnel's equations, unpolarised."""
+"""Reflection and refraction at a smooth boundary: Snell's law and Fresnel's equations, in numbers or lanes."""
 
 from __future__ import annotations
 
-import math
-
 from renderer.kernel import formula
+from renderer.lanes import choose, least, most, root
 
 
 @formula
@@ -17,9 +16,9 @@ def refracted_cosine(cosine: float, eta: float) -> float:
 
     The radicand is formed from (1 - c)(1 + c), which keeps its digits near normal incidence.
     """
-    c = max(0.0, min(1.0, cosine))
+    c = most(0.0, least(1.0, cosine))
     radicand = 1.0 - eta * eta * ((1.0 - c) * (1.0 + c))
-    return math.sqrt(radicand) if radicand > 0.0 else -1.0
+    return choose(radicand > 0.0, root(choose(radicand > 0.0, radicand, 0.0)), -1.0)
 
 
 @formula
@@ -31,11 +30,8 @@ def fresnel(cosine: float, refracted: float, eta: float) -> float:
             total internal reflection.
         eta: index of refraction on the incident side over that behind the boundary.
     """
-    if refracted <= 0.0:
-        return 1.0
-    if eta == 1.0:
-        return 0.0
-    c = max(0.0, min(1.0, cosine))
+    c = most(0.0, least(1.0, cosine))
     parallel = (c - eta * refracted) / (c + eta * refracted)
     perpendicular = (eta * c - refracted) / (eta * c + refracted)
-    return 0.5 * (parallel * parallel + perpendicular * perpendicular)
+    share = 0.5 * (parallel * parallel + perpendicular * perpendicular)
+    return choose(refracted <= 0.0, 1.0, choose(eta == 1.0, 0.0, share))

@@ -8,13 +8,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.gather import entry, keep, lane_numbers, pick
+from renderer.gather import entry, held, keep, lane_numbers, pick
 from renderer.kernel import formula
-from renderer.lanes import LANES, anywhere, choose, least
-from renderer.places import DENSITY, WEIGHTS, WIDTH, keep_surface, keep_surfaces
+from renderer.lanes import anywhere, choose, least
+from renderer.places import DENSITY, WEIGHTS, WIDTH, keep_some_surfaces, keep_surfaces
 from renderer.prepared import DENSITY_COLUMN, Surfaces
 from renderer.rays import Hits, Rays
-from renderer.surface import sphere_met, triangle_surface, weights_at
+from renderer.surface import sphere_surface, triangle_surface, weights_at
 
 SPHERE_DENSITY = 0.5 / math.sqrt(math.pi)
 """Texture coordinates per radius of a sphere, whose whole area one picture covers: the mean over all places."""
@@ -24,6 +24,7 @@ class Group(NamedTuple):
     """LANES rays and what they met, in lanes.
 
     Attributes:
+        row: number of each.
         primitive: what each met, numbered as in `Hits`.
         ox, oy, oz: origin.
         dx, dy, dz: direction.
@@ -31,6 +32,7 @@ class Group(NamedTuple):
         width: of the ray where it ends.
     """
 
+    row: Any
     primitive: Any
     ox: Any
     oy: Any
@@ -50,6 +52,7 @@ def group_of(rays: Rays, hits: Hits, first: int) -> Group:
     row = least(lane_numbers(first), len(hits.primitive) - 1)
     origin, direction, weight, pencil = rays.origin, rays.direction, rays.weight, rays.pencil
     return Group(
+        row,
         entry(hits.primitive, row),
         pick(origin, row, 0), pick(origin, row, 1), pick(origin, row, 2),
         pick(direction, row, 0), pick(direction, row, 1), pick(direction, row, 2),
@@ -59,12 +62,11 @@ def group_of(rays: Rays, hits: Hits, first: int) -> Group:
 
 
 @formula
-def meet(surfaces: Surfaces, rays: Rays, hits: Hits, first: int, group: Group, rows: NDArray[np.float64]) -> None:
+def meet(surfaces: Surfaces, group: Group, rows: NDArray[np.float64]) -> None:
     """Write the surfaces that the rays of a group met, and how wide it is there; where there is none, anything.
 
     Args:
-        surfaces, rays, hits: the scene, all rays and what they met.
-        first: number of the first ray of the group.
+        surfaces: the scene.
         group: the group.
         rows: of `Places`.
     """
@@ -79,10 +81,23 @@ def meet(surfaces: Surfaces, rays: Rays, hits: Hits, first: int, group: Group, r
         keep(rows, WEIGHTS, b1)
         keep(rows, WEIGHTS + 1, b2)
         keep(rows, DENSITY, pick(facets, t, DENSITY_COLUMN))
-    if anywhere((group.primitive >= triangles) & (group.primitive < solids)):
-        for lane in range(LANES):
-            ray = min(first + lane, len(hits.primitive) - 1)
-            k = hits.primitive[ray] - triangles
-            if 0 <= k < len(radius):
-                keep_surface(rows, lane, sphere_met(surfaces.spheres, k, rays.origin, rays.direction, ray))
-                rows[DENSITY, lane] = SPHERE_DENSITY / radius[k]
+    round_ones = (group.primitive >= triangles) & (group.primitive < solids)
+    if anywhere(round_ones):
+        _meet_spheres(surfaces, group, round_ones, rows)
+
+
+@formula
+def _meet_spheres(surfaces: Surfaces, group: Group, marked: Any, rows: NDArray[np.float64]) -> None:
+    """Write the spheres that the marked rays of a group met."""
+    materials, spheres = surfaces.materials, surfaces.spheres
+    k = choose(marked, group.primitive - len(surfaces.facets), 0)
+    material, radius = entry(spheres.material, k), entry(spheres.radius, k)
+    drawn = entry(materials["picture"], material) >= 0
+    drawn = drawn | (entry(materials["specular_picture"], material) >= 0)
+    drawn = drawn | (entry(materials["normal_picture"], material) >= 0)
+    s = sphere_surface(
+        pick(spheres.center, k, 0), pick(spheres.center, k, 1), pick(spheres.center, k, 2), radius, material,
+        group.ox, group.oy, group.oz, group.dx, group.dy, group.dz, marked & drawn,
+    )  # fmt: skip
+    keep_some_surfaces(rows, marked, s)
+    keep(rows, DENSITY, choose(marked, SPHERE_DENSITY / radius, held(rows, DENSITY)))

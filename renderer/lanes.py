@@ -22,7 +22,7 @@ from numba.extending import intrinsic, lower_builtin, models, register_model
 
 from renderer.kernel import COMPILED, formula
 
-_Number = TypeVar("_Number", int, float)
+_Number = TypeVar("_Number", bool, int, float)
 
 LANES = 16
 """Numbers side by side: float64 in one register of AVX-512, in two of AVX2, in four of NEON."""
@@ -321,7 +321,10 @@ power: Callable[[bool, float, float], float] = _of_two(operator.pow)
 exponential: Callable[[bool, float], float] = _of_one(math.exp)
 natural_logarithm: Callable[[bool, float], float] = _of_one(math.log)
 logarithm_beside_one: Callable[[bool, float], float] = _of_one(math.log1p)
-"""The three of (mark, x), where marked."""
+arc_sine: Callable[[bool, float], float] = _of_one(math.asin)
+"""The four of (mark, x), where marked."""
+arc_tangent: Callable[[bool, float, float], float] = _of_two(math.atan2)
+"""arc_tangent(mark, y, x): of y / x in the quadrant of (x, y), where marked."""
 
 
 @formula

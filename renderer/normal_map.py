@@ -20,8 +20,6 @@ of a smooth mesh, the face's own normal takes its place.
 
 from __future__ import annotations
 
-import math
-
 from renderer.kernel import formula
 from renderer.lanes import choose, most, root
 from renderer.surface import Surface
@@ -82,12 +80,15 @@ def bumped(
 @formula
 def mirroring(s: Surface, hx: float, hy: float, hz: float, dx: float, dy: float, dz: float) -> Surface:
     """A surface that `bumped` bent from the unit normal h, with a normal that mirrors the ray off it."""
-    if s.nx == hx and s.ny == hy and s.nz == hz:
-        return s
+    bent = (s.nx != hx) | (s.ny != hy) | (s.nz != hz)
     hx, hy, hz, facing = _facing(s, hx, hy, hz, dx, dy, dz)
     toward = -(dx * s.nx + dy * s.ny + dz * s.nz)
     upright = s.nx * hx + s.ny * hy + s.nz * hz
-    pull = math.sqrt(max(0.0, toward * toward + facing * facing - 2.0 * toward * upright * facing)) - toward
-    if not pull > 0.0:
-        return s
-    return _with_normal(s, facing * s.nx + pull * hx, facing * s.ny + pull * hy, facing * s.nz + pull * hz)
+    pull = root(most(0.0, toward * toward + facing * facing - 2.0 * toward * upright * facing)) - toward
+    pulled = bent & (pull > 0.0)
+    return _with_normal(
+        s,
+        choose(pulled, facing * s.nx + pull * hx, 0.0),
+        choose(pulled, facing * s.ny + pull * hy, 0.0),
+        choose(pulled, facing * s.nz + pull * hz, 0.0),
+    )

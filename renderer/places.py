@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,10 +10,12 @@ from numpy.typing import NDArray
 from renderer.finish import Finish
 from renderer.gather import held, keep
 from renderer.kernel import formula
-from renderer.lanes import LANES, whole
+from renderer.lanes import LANES, choose, whole
 from renderer.surface import Surface
 
 SURFACE = 0
+MATERIAL = SURFACE + 13
+ENTERING = SURFACE + 14
 FINISH = 15
 CALLS = FINISH + 6
 WEIGHTS = 31
@@ -22,9 +24,20 @@ MIRRORED = 34
 EYE = 37
 WIDTH = 40
 ROWS = 41
-"""Rows of `Places.rows`: the 15 numbers of a surface, the 16 of its finish with CALLS among them, the weights of a
+"""Rows of `Places.rows`: the 15 numbers of a surface with MATERIAL and ENTERING
+among them, the 16 of its finish with CALLS among them, the weights of a
 triangle's second and third corner, texture coordinates per scene unit, what it mirrors, the direction to the eye, and
 the width of the ray; ROWS of them."""
+
+REFRACTED, MIRRORED_ON = 0, 11
+GOES, FROM, TOWARDS, SHARE, SPREAD = 0, 1, 4, 7, 10
+ETA = 22
+CHILD_ROWS = 23
+"""Rows of `Places.children`: from REFRACTED and from MIRRORED_ON on a ray that the surface sends on, whether it does,
+its origin, direction, weight, and how its width grows; the index of refraction before the surface over that behind."""
+
+BEHIND, BEFORE = 0, 1
+"""Rows of `Places.around`: the media that these are in."""
 
 SENT = 0
 START = 3
@@ -43,16 +56,21 @@ class Places(NamedTuple):
     Attributes:
         rows: (ROWS, LANES) float64.
         light: (LIGHTS + LIGHT_ROWS * l, LANES) float32 for l point lights.
+        children: (CHILD_ROWS, LANES) float64.
+        around: (2, LANES) int64.
     """
 
     rows: NDArray[np.float64]
     light: NDArray[np.float32]
+    children: NDArray[np.float64]
+    around: NDArray[np.int64]
 
 
 def make_places(lights: int) -> Places:
     """Room for a scene of `lights` point lights."""
     light = np.zeros((LIGHTS + LIGHT_ROWS * lights, LANES), dtype=np.float32)
-    return Places(np.zeros((ROWS, LANES)), light)
+    children, around = np.zeros((CHILD_ROWS, LANES)), np.zeros((2, LANES), dtype=np.int64)
+    return Places(np.zeros((ROWS, LANES)), light, children, around)
 
 
 @formula
@@ -76,14 +94,20 @@ def keep_surfaces(rows: NDArray[np.float64], s: Surface) -> None:
 
 
 @formula
-def keep_surface(rows: NDArray[np.float64], lane: int, s: Surface) -> None:
-    """Write the surface that one ray met."""
-    rows[SURFACE, lane], rows[SURFACE + 1, lane], rows[SURFACE + 2, lane] = s.px, s.py, s.pz
-    rows[SURFACE + 3, lane], rows[SURFACE + 4, lane], rows[SURFACE + 5, lane] = s.gx, s.gy, s.gz
-    rows[SURFACE + 6, lane], rows[SURFACE + 7, lane], rows[SURFACE + 8, lane] = s.nx, s.ny, s.nz
-    rows[SURFACE + 9, lane], rows[SURFACE + 10, lane] = s.u, s.v
-    rows[SURFACE + 11, lane], rows[SURFACE + 12, lane] = s.offset, s.lift
-    rows[SURFACE + 13, lane], rows[SURFACE + 14, lane] = float(s.material), 1.0 if s.entering else 0.0
+def keep_some_surfaces(rows: NDArray[np.float64], marked: Any, s: Surface) -> None:
+    """Write the surfaces that the marked rays met, and leave the others."""
+    old = surfaces_of(rows)
+    keep_surfaces(
+        rows,
+        Surface(
+            choose(marked, s.px, old.px), choose(marked, s.py, old.py), choose(marked, s.pz, old.pz),
+            choose(marked, s.gx, old.gx), choose(marked, s.gy, old.gy), choose(marked, s.gz, old.gz),
+            choose(marked, s.nx, old.nx), choose(marked, s.ny, old.ny), choose(marked, s.nz, old.nz),
+            choose(marked, s.u, old.u), choose(marked, s.v, old.v),
+            choose(marked, s.offset, old.offset), choose(marked, s.lift, old.lift),
+            choose(marked, s.material, old.material), choose(marked, s.entering, old.entering),
+        ),
+    )  # fmt: skip
 
 
 @formula

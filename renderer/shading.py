@@ -21,7 +21,7 @@ from renderer.places import CALLS, SENT, Places
 from renderer.prepared import Surfaces
 from renderer.rays import Hits, Rays, ShadowRays
 from renderer.shadow_rays import ask_area_lights, ask_point_lights
-from renderer.spawning import CHILDREN, SHADOWS, spawn_rays
+from renderer.spawning import CHILDREN, SHADOWS, send_on, write_children
 
 AHEAD = 2 * LANES
 """How many rays ahead a triangle is fetched from memory: its latency over the time of one ray."""
@@ -58,6 +58,7 @@ def shade(
     facets, primitive_of, sample_of = surfaces.facets, hits.primitive, rays.sample
     rows, light, point_lights, area_lights = places.rows, places.light, len(surfaces.lights), len(surfaces.area_lights)
     solids, n = len(facets) + len(surfaces.spheres.radius), len(primitive_of)
+    nested = len(surfaces.indices) > 1
     counters[:] = 0
     n_children = 0
     n_shadows = 0
@@ -67,9 +68,11 @@ def shade(
         group = group_of(rays, hits, first)
         seen = (group.primitive >= 0) & (group.primitive < solids)
         if anywhere(seen):
-            meet(surfaces, rays, hits, first, group, rows)
+            meet(surfaces, group, rows)
             s, finish = finish_off(surfaces, group, seen, rows)
             light_up(surfaces, group, seen, s, finish, places)
+            if spawn and anywhere(finish.calls & SPAWNS != 0):
+                send_on(surfaces, rays, primitive_of, first, group, seen, s, finish, cutoff, places)
         light_beyond(surfaces, group, seen, places)
         for ray in range(first, min(first + LANES, n)):
             # Unsigned, so that no code looks for indices that count from the end.
@@ -87,8 +90,6 @@ def shade(
                         surfaces, rays, ray, rows, lane, draws, radiance, shadows, n_shadows
                     )  # fmt: skip
             if spawn and calls & SPAWNS != 0:
-                n_children = spawn_rays(
-                    surfaces, rays, ray, primitive, rows, lane, cutoff, children, n_children, counters
-                )  # fmt: skip
+                n_children = write_children(places, lane, sample, nested, children, n_children, counters)
     counters[CHILDREN] = n_children
     counters[SHADOWS] = n_shadows

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from renderer.gather import octet
 from renderer.kernel import formula
-from renderer.lanes import anywhere, choose, least, most, root, whole
+from renderer.lanes import anywhere, arc_sine, arc_tangent, choose, least, most, root, size, whole
 from renderer.prepared import MATERIAL_COLUMN
 from renderer.sphere import SphereTree, hit_distance
 
@@ -60,7 +60,7 @@ class Surface(NamedTuple):
 
 @formula
 def _farther(a: float, b: float, c: float, limit: float) -> float:
-    return max(limit, max(abs(a), max(abs(b), abs(c))))
+    return most(limit, most(size(a), most(size(b), size(c))))
 
 
 @formula
@@ -145,24 +145,26 @@ def triangle_surface(f: NDArray[np.float32], t: int, b1: float, b2: float, dx: f
 @formula
 def sphere_surface(
     cx: float, cy: float, cz: float, radius: float, material: int,
-    ox: float, oy: float, oz: float, dx: float, dy: float, dz: float,
+    ox: float, oy: float, oz: float, dx: float, dy: float, dz: float, drawn: bool,
 ) -> Surface:  # fmt: skip
-    """The surface of a sphere where a ray meets it; u is longitude, v latitude, from 0 to 1 each.
+    """The surface of a sphere where a ray meets it; u is longitude, v latitude, from 0 to 1 each, where `drawn`.
 
-    The direction is the very one that hit: after rounding it anew a ray along the rim could miss.
+    All are numbers or lanes. The direction is the very one that hit: after rounding it anew a ray along the rim could
+    miss.
     """
     t = hit_distance(ox, oy, oz, dx, dy, dz, cx, cy, cz, radius)
     nx, ny, nz = ox + t * dx - cx, oy + t * dy - cy, oz + t * dz - cz
-    length = math.sqrt(nx * nx + ny * ny + nz * nz)
+    length = root(nx * nx + ny * ny + nz * nz)
     nx, ny, nz = nx / length, ny / length, nz / length
-    u = 0.5 + math.atan2(nx, nz) / (2.0 * math.pi)
-    v = 0.5 + math.asin(max(-1.0, min(1.0, ny))) / math.pi
+    u = 0.5 + arc_tangent(drawn, nx, nz) / (2.0 * math.pi)
+    v = 0.5 + arc_sine(drawn, most(-1.0, least(1.0, ny))) / math.pi
     px, py, pz = cx + radius * nx, cy + radius * ny, cz + radius * nz
     entering = nx * dx + ny * dy + nz * dz <= 0.0
-    face = 1.0 if entering else -1.0
+    face = choose(entering, 1.0, -1.0)
     nx, ny, nz = nx * face, ny * face, nz * face
     offset = _farther(px, py, pz, 0.0) * OFFSET_ULPS + _farther(cx, cy, cz, radius) * SPHERE_OFFSET
-    return Surface(px, py, pz, nx, ny, nz, nx, ny, nz, u, v, offset, 0.0, material, entering)
+    lift = choose(entering, 0.0, 0.0)
+    return Surface(px, py, pz, nx, ny, nz, nx, ny, nz, u, v, offset, lift, material, entering)
 
 
 @formula
@@ -174,7 +176,7 @@ def sphere_met(
     return sphere_surface(
         center[k, 0], center[k, 1], center[k, 2], spheres.radius[k], int(np.int64(spheres.material[k])),
         np.float64(origin[ray, 0]), np.float64(origin[ray, 1]), np.float64(origin[ray, 2]),
-        np.float64(direction[ray, 0]), np.float64(direction[ray, 1]), np.float64(direction[ray, 2]),
+        np.float64(direction[ray, 0]), np.float64(direction[ray, 1]), np.float64(direction[ray, 2]), True,
     )  # fmt: skip
 
 

@@ -16,6 +16,8 @@ from renderer.kernel import kernel
 from renderer.lanes import (
     LANES,
     anywhere,
+    arc_sine,
+    arc_tangent,
     binary_logarithm,
     choose,
     exponential,
@@ -60,6 +62,8 @@ def arithmetic_in_lanes(x: NDArray[np.float64], y: NDArray[np.float64], out: NDA
     keep(out, 15, choose(anywhere(a > b), 1.0, 0.0))
     keep(out, 16, held(out, 4) == held(out, 5))
     keep(out, 17, single(a) * single(b))
+    keep(out, 18, arc_sine(size(a) <= 1.0, a))
+    keep(out, 19, arc_tangent(a > 0.0, a, b))
 
 
 @kernel
@@ -87,6 +91,8 @@ def arithmetic_of_numbers(x: NDArray[np.float64], y: NDArray[np.float64], out: N
         out[15, lane] = 1.0 if greater else 0.0
         out[16, lane] = 1.0 if out[4, lane] == out[5, lane] else 0.0
         out[17, lane] = np.float64(np.float32(a)) * np.float64(np.float32(b))
+        out[18, lane] = math.asin(a) if abs(a) <= 1.0 else 0.0
+        out[19, lane] = math.atan2(a, b) if a > 0.0 else 0.0
 
 
 @given(numbers, numbers)

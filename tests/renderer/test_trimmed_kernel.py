@@ -72,11 +72,11 @@ def trimmed_shade(prepared: PreparedScene) -> Any:
     if not bits & material_table.GRAINED:
         never.append("anywhere(calls & GRAINED != 0)")
     if not bits & material_table.SPAWNS:
-        never.append("spawn and calls & SPAWNS != 0")
+        never += ["spawn and anywhere(finish.calls & SPAWNS != 0)", "spawn and calls & SPAWNS != 0"]
     if not bits & material_table.MICROFACETS:
         never.append("anywhere(faceted)")
     if len(prepared.surfaces.indices) == 1:
-        never += ["len(indices) > 1", "material.medium > 0"]
+        never += ["len(surfaces.indices) > 1", "nested"]
     if not len(prepared.surfaces.area_lights):
         never.append("area_lights > 0")
     response = trimmed(reflectance.reflectance, never, {})
@@ -86,7 +86,8 @@ def trimmed_shade(prepared: PreparedScene) -> Any:
         "finish_off": trimmed(finishing.finish_off, never, {}),
         "light_up": trimmed(lighting.light_up, never, {"point_light": from_point, "even_light": evenly}),
         "ask_area_lights": trimmed(shadow_rays.ask_area_lights, never, {"reflectance": response}),
-        "spawn_rays": trimmed(spawning.spawn_rays, never, {}),
+        "send_on": trimmed(spawning.send_on, never, {}),
+        "write_children": trimmed(spawning.write_children, never, {}),
     }
     return trimmed(shading.shade, never, changed)
 

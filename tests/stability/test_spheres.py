@@ -137,7 +137,7 @@ def test_h22_a_grid_of_rays_hits_within_the_outline() -> None:
 @pytest.mark.parametrize("up", [1.0, -1.0])
 @pytest.mark.parametrize("beside", [0.0, -0.0, 1e-30, 1e-12])
 def test_h22_the_poles_have_a_normal_and_texture_coordinates(radius: float, up: float, beside: float) -> None:
-    s = sphere_surface(0.0, 0.0, 0.0, radius, 0, beside * radius, 3.0 * up * radius, 0.0, 0.0, -up, 0.0)
+    s = sphere_surface(0.0, 0.0, 0.0, radius, 0, beside * radius, 3.0 * up * radius, 0.0, 0.0, -up, 0.0, True)
     assert (s.px, s.py, s.pz) == pytest.approx((beside * radius, up * radius, 0.0), abs=4 * U * radius)
     assert (s.nx, s.ny, s.nz) == pytest.approx((beside, up, 0.0), abs=1e-15)
     assert 0.0 <= s.u <= 1.0
@@ -157,7 +157,7 @@ def leave_sphere(
     for ray in range(len(again)):
         s = sphere_surface(
             cx, cy, cz, r, 0, start[ray, 0], start[ray, 1], start[ray, 2],
-            coming[ray, 0], coming[ray, 1], coming[ray, 2],
+            coming[ray, 0], coming[ray, 1], coming[ray, 2], True,
         )  # fmt: skip
         x, y, z = out[ray, 0], out[ray, 1], out[ray, 2]
         side = 1.0 if x * s.gx + y * s.gy + z * s.gz >= 0.0 else -1.0

@@ -168,7 +168,7 @@ def coordinates(place: tuple[float, float, float]) -> tuple[float, float]:
     """(u, v) of the unit sphere where a ray to the centre meets it."""
     x, y, z = (9 * part for part in place)
     length = math.hypot(x, y, z)
-    s = sphere_surface(0, 0, 0, 1.0, 0, x, y, z, -x / length, -y / length, -z / length)
+    s = sphere_surface(0, 0, 0, 1.0, 0, x, y, z, -x / length, -y / length, -z / length, True)
     return s.u, s.v
 
 
