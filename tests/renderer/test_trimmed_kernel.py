@@ -33,8 +33,8 @@ as much as two runs of the same kernel differ."""
 TESTS_OF_EFFECTS = {
     "textures": ("anywhere((picture >= 0) | (specular_picture >= 0) | (normal_picture >= 0))",),
     "specular": ("anywhere(shiny)",),
-    "reflection": ("material.calls & MIRROR != 0",),
-    "refraction": ("material.calls & REFRACTS != 0",),
+    "reflection": ("anywhere(goes)",),
+    "refraction": ("(calls & REFRACTS != 0)",),
 }
 NEVER_FORCED = (
     "anyway & MIRROR_ANYWAY != 0",
@@ -68,7 +68,7 @@ def trimmed_shade(prepared: PreparedScene) -> Any:
     never += NEVER_FORCED
     bits = np.bitwise_or.reduce(prepared.surfaces.materials["calls"])
     if not bits & material_table.BOUNDARY:
-        never.append("material.calls & (BOUNDARY | REFRACTS_ANYWAY) != 0")
+        never.append("anywhere(through)")
     if not bits & material_table.GRAINED:
         never.append("anywhere(calls & GRAINED != 0)")
     if not bits & material_table.SPAWNS:
@@ -76,7 +76,7 @@ def trimmed_shade(prepared: PreparedScene) -> Any:
     if not bits & material_table.MICROFACETS:
         never.append("anywhere(faceted)")
     if len(prepared.surfaces.indices) == 1:
-        never += ["len(surfaces.indices) > 1", "nested"]
+        never.append("len(surfaces.indices) > 1")
     if not len(prepared.surfaces.area_lights):
         never.append("area_lights > 0")
     response = trimmed(reflectance.reflectance, never, {})
