@@ -31,6 +31,7 @@ SHARES = {
     "polygon._FLAT": "the sine of an angle",
     "prepared.FLAT_NORMAL": "a difference between unit vectors",
     "sampling.TO_UNIT": "32-bit integers to [0, 1)",
+    "sphere.BEYOND": "of the distance of the nearest hit: four million float64 spacings",
     "sphere.build_sphere_tree": "of a sphere's radius: 4 float64 spacings",
     "surface.OFFSET_ULPS": "of the largest coordinate of a triangle: 16 float32 spacings",
     "surface.SPHERE_OFFSET": "of a sphere's largest coordinate: 16 float64 spacings",
