@@ -12,11 +12,9 @@ from renderer.allocator import apart
 from renderer.display import Display
 from renderer.eccentricity import EyeGeometry, eye_geometry, fill_cell_sizes, largest_cell_side
 from renderer.gaze import GazeBucket
-from renderer.tiling import mark_scanline, number_cells, number_scanline_cells, tile_side, tile_strip
+from renderer.numbering import number_cells, number_scanline_cells, renumber
+from renderer.tiling import mark_scanline, tile_side, tile_strip
 from renderer.workers import Workers
-
-FULL_STRIP_ROWS = 64
-"""Rows of the strips in which work over whole pixels is divided."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -122,17 +120,20 @@ def _aligned_map(eye: EyeGeometry, bucket: GazeBucket, pool: Workers) -> CellMap
 
 def _scanline_map(eye: EyeGeometry, bucket: GazeBucket, pool: Workers) -> CellMap:
     shape = (eye.height_px, eye.width_px)
-    sizes = np.zeros(shape, dtype=np.uint16)
-
-    def measure(strip: int) -> None:
-        top = strip * FULL_STRIP_ROWS
-        fill_cell_sizes(eye, top, 0, False, sizes[top : top + FULL_STRIP_ROWS])
-
-    pool.run(measure, -(-eye.height_px // FULL_STRIP_ROWS))
-    corners = np.zeros(shape, dtype=np.uint16)
+    tile_px = tile_side(largest_cell_side(eye))
+    tops = range(0, eye.height_px, tile_px)
+    sizes, corners = np.zeros(shape, dtype=np.uint16), np.zeros(shape, dtype=np.uint16)
+    rows = [slice(top, top + tile_px) for top in tops]
+    pool.run(lambda strip: fill_cell_sizes(eye, tops[strip], 0, False, sizes[rows[strip]]), len(tops))
     mask = apart(shape, np.int32)
     mask[:] = -1
     count = mark_scanline(sizes, corners, mask)
-    x, y, side = (apart(count, np.int32) for _ in range(3))
-    number_scanline_cells(corners, x, y, side)
+    first = np.cumsum([0, *(np.count_nonzero(corners[strip]) for strip in rows)])
+    x, y, side, numbers = (apart(count, np.int32) for _ in range(4))
+
+    def number(strip: int) -> None:
+        number_scanline_cells(tile_px, tops[strip], int(first[strip]), corners, mask, x, y, side, numbers)
+
+    pool.run(number, len(tops))
+    pool.run(lambda strip: renumber(numbers, mask[rows[strip]]), len(tops))
     return CellMap("scanline", bucket, x, y, side, mask)

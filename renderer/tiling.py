@@ -12,9 +12,6 @@ A *corner* array says where cells begin: the side of the cell at its top-left pi
 
 The screen is tiled tile by tile, each a square of the screen that no aligned square crosses. Where rho allows the same
 squares all over a tile, or a part of it that none crosses, that is a plain grid, and no pixel of it is looked at.
-
-Within a tile, cells are numbered group by group, a group being GROUP x GROUP of the smallest cells of the tile: rays
-that are traced side by side then go more alike than along a row, and what they meet is found in less time.
 """
 
 from __future__ import annotations
@@ -27,9 +24,6 @@ from renderer.kernel import formula, kernel, roomy_kernel
 
 LEAST_TILE_PX = 24
 """Least side of a tile or a part of one [px]: nine tenths of such tiles of a desktop screen are plain grids."""
-
-GROUP = 4
-"""Cells along the side of a group: as many in it as rays in a packet of Embree."""
 
 
 def tile_side(largest_side: int) -> int:
@@ -225,141 +219,3 @@ def mark_scanline(sizes: NDArray[np.uint16], corners: NDArray[np.uint16], mask: 
                         mask[below, beside] = count
             count += 1
     return count
-
-
-@kernel
-def number_cells(
-    top: int,
-    first_cell: int,
-    corners: NDArray[np.uint16],
-    sides: NDArray[np.uint16],
-    x: NDArray[np.int32],
-    y: NDArray[np.int32],
-    side: NDArray[np.int32],
-    mask: NDArray[np.int32],
-) -> None:
-    """Number the cells of one row of tiles, tile by tile, and fill the mask.
-
-    Args:
-        top: first row of the tiles on the screen.
-        first_cell: number of their first cell.
-        corners, sides: of `tile_strip`.
-        x, y, side: (n,) int32 cell vector of the whole map, written from `first_cell` on.
-        mask: (h, w) int32 of the whole map, the tiles' rows written.
-    """
-    height, width = mask.shape
-    rows, columns = corners.shape[1:]
-    bottom = min(height, top + rows)
-    cell = first_cell
-    for tile in range(len(sides)):
-        left = tile * columns
-        right = min(width, left + columns)
-        if sides[tile] > 0:
-            cell = _number_grid(top, left, bottom, right, int(sides[tile]), cell, x, y, side, mask)
-            continue
-        marked = corners[tile, : bottom - top, : right - left]
-        cell = _number_marked(top, left, marked, cell, x, y, side, mask)
-
-
-@formula
-def _number_marked(
-    top: int,
-    left: int,
-    corners: NDArray[np.uint16],
-    cell: int,
-    x: NDArray[np.int32],
-    y: NDArray[np.int32],
-    side: NDArray[np.int32],
-    mask: NDArray[np.int32],
-) -> int:
-    """Number the squares of a tile that begin where `corners` say; return the number after the last."""
-    rows, columns = corners.shape
-    group_px = GROUP * _smallest_side(corners)
-    for group_row in range(0, rows, group_px):
-        for group_column in range(0, columns, group_px):
-            for row in range(group_row, min(rows, group_row + group_px)):
-                for column in range(group_column, min(columns, group_column + group_px)):
-                    length = int(corners[row, column])
-                    if length > 0:
-                        _number_group(top + row, left + column, 1, 1, length, cell, x, y, side, mask)
-                        cell += 1
-    return cell
-
-
-@formula
-def _smallest_side(corners: NDArray[np.uint16]) -> int:
-    """Side of the smallest cell of a tile [px]."""
-    smallest = int(corners.shape[0])
-    for row in range(corners.shape[0]):
-        for column in range(corners.shape[1]):
-            if corners[row, column] > 0:
-                smallest = min(smallest, int(corners[row, column]))
-    return smallest
-
-
-@formula
-def _number_grid(
-    top: int,
-    left: int,
-    bottom: int,
-    right: int,
-    length: int,
-    cell: int,
-    x: NDArray[np.int32],
-    y: NDArray[np.int32],
-    side: NDArray[np.int32],
-    mask: NDArray[np.int32],
-) -> int:
-    """Number the squares of `length` pixels of a tile that is a plain grid; return the number after the last."""
-    group_px = GROUP * length
-    for row in range(top, bottom, group_px):
-        for column in range(left, right, group_px):
-            down = (min(bottom, row + group_px) - row) // length
-            across = (min(right, column + group_px) - column) // length
-            if down == GROUP and across == GROUP and length == 1:  # the compiler takes a group of known size at once
-                _number_group(row, column, GROUP, GROUP, 1, cell, x, y, side, mask)
-            else:
-                _number_group(row, column, down, across, length, cell, x, y, side, mask)
-            cell += down * across
-    return cell
-
-
-@formula
-def _number_group(
-    top: int,
-    left: int,
-    down: int,
-    across: int,
-    length: int,
-    first: int,
-    x: NDArray[np.int32],
-    y: NDArray[np.int32],
-    side: NDArray[np.int32],
-    mask: NDArray[np.int32],
-) -> None:
-    """Number `down` rows of `across` squares of `length` pixels."""
-    for row in range(down):
-        for column in range(across):
-            cell = np.uint64(first + row * across + column)
-            x[cell], y[cell], side[cell] = left + column * length, top + row * length, length
-    for row in range(down):
-        for below in range(length):
-            line = mask[top + row * length + below]
-            for column in range(across):
-                for beside in range(length):
-                    line[np.uint64(left + column * length + beside)] = first + row * across + column
-
-
-@kernel
-def number_scanline_cells(
-    corners: NDArray[np.uint16], x: NDArray[np.int32], y: NDArray[np.int32], side: NDArray[np.int32]
-) -> None:
-    """Write the cell vector of a scanline map, in the order in which the cells were opened."""
-    cell = 0
-    for row in range(corners.shape[0]):
-        for column in range(corners.shape[1]):
-            if corners[row, column] > 0:
-                x[cell] = column
-                y[cell] = row
-                side[cell] = corners[row, column]
-                cell += 1
