@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.kernel import formula, kernel
+from renderer.rays import Vectors
 from renderer.scene import AreaLight, Light, SphereLight
 from renderer.sphere import hit_distance
 
@@ -84,8 +85,8 @@ def _write(row: Any, name: str, vector: NDArray[np.float64]) -> None:
 @kernel
 def nearest_area_lights(
     lights: NDArray[np.void],
-    origin: NDArray[np.float32],
-    direction: NDArray[np.float32],
+    origin: Vectors,
+    direction: Vectors,
     first_id: int,
     distance: NDArray[np.float32],
     primitive: NDArray[np.int32],
@@ -94,14 +95,14 @@ def nearest_area_lights(
 
     Args:
         lights: (l,) AREA_LIGHT.
-        origin, direction: (n, 3) float32 rays.
+        origin, direction: of n rays.
         first_id: number of light 0 as a primitive.
         distance: (n,) float32 distance of the nearest hit so far, in lengths of the direction.
         primitive: (n,) int32 what was hit, -1 for nothing.
     """
     for ray in range(len(distance)):
-        ox, oy, oz = np.float64(origin[ray, 0]), np.float64(origin[ray, 1]), np.float64(origin[ray, 2])
-        dx, dy, dz = np.float64(direction[ray, 0]), np.float64(direction[ray, 1]), np.float64(direction[ray, 2])
+        ox, oy, oz = np.float64(origin.x[ray]), np.float64(origin.y[ray]), np.float64(origin.z[ray])
+        dx, dy, dz = np.float64(direction.x[ray]), np.float64(direction.y[ray]), np.float64(direction.z[ray])
         best = np.float64(distance[ray]) if primitive[ray] >= 0 else math.inf
         found = -1
         for index in range(len(lights)):

@@ -10,7 +10,7 @@ import statistics
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,7 @@ from renderer.gaze import Gaze, bucket_of
 from renderer.intersection import Intersector
 from renderer.pipeline import Renderer
 from renderer.prepared import PreparedScene
-from renderer.rays import Hits
+from renderer.rays import Hits, Vectors, copied, rows_of
 from renderer.workers import WorkerPool
 
 GAZE_STEP_PX = 20.0
@@ -78,25 +78,41 @@ class Benchmark:
     figures: tuple[Figure, ...]
 
 
+class RecordedRays(NamedTuple):
+    """Batches of rays.
+
+    Attributes:
+        nearest: origin and direction of each batch, columns or (n, 3) float32.
+        shadow: the same with the reach.
+    """
+
+    nearest: list[tuple[Any, Any]]
+    shadow: list[tuple[Any, Any, NDArray[np.float32]]]
+
+    def rows(self) -> RecordedRays:
+        """The same as (n, 3) float32, as embreex takes them."""
+        return RecordedRays(
+            [(rows_of(origin), rows_of(direction)) for origin, direction in self.nearest],
+            [(rows_of(origin), rows_of(direction), reach) for origin, direction, reach in self.shadow],
+        )
+
+
 class RecordingIntersector:
     """Answers like the intersector it stands for, and keeps the rays it was asked about."""
 
     def __init__(self, intersector: Intersector) -> None:
         """Record what `intersector` is asked."""
         self._intersector = intersector
-        self.nearest_rays: list[tuple[NDArray[np.float32], NDArray[np.float32]]] = []
-        self.shadow_rays: list[tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]] = []
+        self.rays = RecordedRays([], [])
 
-    def nearest(self, origin: NDArray[np.float32], direction: NDArray[np.float32]) -> Hits:
+    def nearest(self, origin: Vectors, direction: Vectors) -> Hits:
         """As `Intersector.nearest`."""
-        self.nearest_rays.append((origin.copy(), direction.copy()))
+        self.rays.nearest.append((copied(origin), copied(direction)))
         return self._intersector.nearest(origin, direction)
 
-    def occluded(
-        self, origin: NDArray[np.float32], direction: NDArray[np.float32], reach: NDArray[np.float32]
-    ) -> NDArray[np.uint8]:
+    def occluded(self, origin: Vectors, direction: Vectors, reach: NDArray[np.float32]) -> NDArray[np.uint8]:
         """As `Intersector.occluded`."""
-        self.shadow_rays.append((origin.copy(), direction.copy(), reach.copy()))
+        self.rays.shadow.append((copied(origin), copied(direction), reach.copy()))
         return self._intersector.occluded(origin, direction, reach)
 
 
@@ -130,14 +146,15 @@ def measure_frame(
     renderer.render(prepared, moved)
     intersector = prepared.intersector
     bare, packets = (intersector.bare_nearest, intersector.bare_occluded), (intersector.nearest, intersector.occluded)
-    trace_rays(recorder, pool, *bare)  # its search tree is built at the first use
+    columns, rows = recorder.rays, recorder.rays.rows()
+    trace_rays(rows, pool, *bare)  # its search tree is built at the first use
     for _ in range(repeats):
         renderer.forget_samples()
         frame = timed(FRAME, lambda: renderer.render(prepared, request))
         times[TRACE].append(frame.cost.time_ms.trace)
         times[RECONSTRUCT].append(frame.cost.time_ms.reconstruct)
-        timed(BARE, lambda: trace_rays(recorder, pool, *bare))
-        timed(PACKETS, lambda: trace_rays(recorder, pool, *packets))
+        timed(BARE, lambda: trace_rays(rows, pool, *bare))
+        timed(PACKETS, lambda: trace_rays(columns, pool, *packets))
         timed(MOVED, lambda: renderer.render(prepared, moved))
         timed(STORED, lambda: renderer.render(prepared, request))
         timed(MAP, lambda: _build_map(request, pool))
@@ -153,19 +170,19 @@ def _build_map(request: FrameRequest, pool: WorkerPool) -> None:
 
 
 def trace_rays(
-    recorder: RecordingIntersector,
+    rays: RecordedRays,
     pool: WorkerPool,
-    nearest: Callable[[NDArray[np.float32], NDArray[np.float32]], object],
-    occluded: Callable[[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]], object],
+    nearest: Callable[[Any, Any], object],
+    occluded: Callable[[Any, Any, NDArray[np.float32]], object],
 ) -> None:
-    """Trace the recorded rays and do nothing else, batch by batch on all threads.
+    """Trace recorded rays and do nothing else, batch by batch on all threads.
 
     Args:
-        recorder: with the rays.
+        rays: the rays.
         pool: threads.
         nearest, occluded: what traces them, as the methods of `Intersector`.
     """
-    seen, shadow = recorder.nearest_rays, recorder.shadow_rays
+    seen, shadow = rays
     reaches = [reach.copy() for _, _, reach in shadow]
 
     def trace(batch: int) -> None:

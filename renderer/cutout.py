@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from renderer.intersection import Intersector
 from renderer.kernel import kernel
 from renderer.prepared import MATERIAL_COLUMN, Sieve, Surfaces
-from renderer.rays import Hits, ShadowRays
+from renderer.rays import Hits, ShadowRays, Vectors, some_vectors
 from renderer.surface import go_on_behind, surface_met
 from renderer.texture import opacity
 
@@ -24,8 +24,8 @@ MOST_HOLES = 64
 @kernel
 def find_holes(
     surfaces: Surfaces,
-    origin: NDArray[np.float32],
-    direction: NDArray[np.float32],
+    origin: Vectors,
+    direction: Vectors,
     hits: Hits,
     rows: NDArray[np.int32],
     passed: NDArray[np.float32],
@@ -34,8 +34,8 @@ def find_holes(
 
     Args:
         surfaces: of the hits.
-        origin: (n, 3) float32 of the rays; those of the rays found are moved.
-        direction: (n, 3) float32.
+        origin: of n rays; those of the rays found are moved.
+        direction: theirs.
         hits: what each ray met.
         rows: (k,) int32 rays to look at; those found are written to its front.
         passed: (n,) float32 distance of each ray's origin from where it began; added to.
@@ -71,25 +71,25 @@ def find_holes(
 def pass_holes(
     surfaces: Surfaces,
     intersector: Intersector,
-    origin: NDArray[np.float32],
-    direction: NDArray[np.float32],
+    origin: Vectors,
+    direction: Vectors,
     hits: Hits,
 ) -> None:
     """Send the rays that met a hole on, until each has met something whole, or nothing.
 
     Args:
         surfaces, intersector: what the rays met.
-        origin: (n, 3) float32; for rays that passed a hole, it becomes the last place they went on from.
-        direction: (n, 3) float32.
+        origin: of n rays; for those that passed a hole, it becomes the last place they went on from.
+        direction: theirs.
         hits: of the rays, replaced by those behind the holes; distances still count from where a ray began.
     """
-    rows = np.arange(len(origin), dtype=np.int32)
-    passed = np.zeros(len(origin), dtype=np.float32)
+    rows = np.arange(len(hits.primitive), dtype=np.int32)
+    passed = np.zeros(len(rows), dtype=np.float32)
     for _ in range(MOST_HOLES):
         rows = rows[: find_holes(surfaces, origin, direction, hits, rows, passed)]
         if len(rows) == 0:
             break
-        behind = intersector.nearest(origin[rows], direction[rows])
+        behind = intersector.nearest(some_vectors(origin, rows), some_vectors(direction, rows))
         for known, new in zip(hits, behind, strict=True):
             known[rows] = new
     hits.distance[:] += passed
@@ -107,7 +107,7 @@ def cast_through(sieve: Sieve, shadows: ShadowRays, reach: NDArray[np.float32], 
     rows = np.flatnonzero(blocked == 0)
     if len(rows) == 0:
         return
-    origin, direction = shadows.origin[rows], shadows.direction[rows]
+    origin, direction = some_vectors(shadows.origin, rows), some_vectors(shadows.direction, rows)
     hits = sieve.intersector.nearest(origin, direction)
     pass_holes(sieve.surfaces, sieve.intersector, origin, direction, hits)
     blocked[rows] = (hits.primitive >= 0) & (hits.distance < reach[rows])

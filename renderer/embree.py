@@ -36,6 +36,7 @@ from renderer.packets import (
     trace_occluded,
     turned,
 )
+from renderer.rays import Vectors, columns, rows_of, vectors_of
 
 log = logging.getLogger(__name__)
 
@@ -131,27 +132,32 @@ class EmbreeTriangles:
         return plain_scene(self._vertices, self._faces, robust=True)
 
     def nearest(
-        self, origin: NDArray[np.float32], direction: NDArray[np.float32], coherent: bool = True
+        self,
+        origin: Vectors | NDArray[np.float32],
+        direction: Vectors | NDArray[np.float32],
+        coherent: bool = True,
     ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
         """Number of the nearest triangle along each ray, -1 for none, and its distance; of two equally near the lower.
 
         Args:
-            origin, direction: (n, 3) float32, C-contiguous, finite.
+            origin, direction: of n rays, finite; columns, or (n, 3) float32.
             coherent: whether they are searched together: faster if neighbouring rays go much the same way, as
                 camera rays, shadow rays and mirror rays do. It does not change the answer.
 
         Returns:
             (n,) int32 and (n,) float32 in lengths of the direction; the distance of a miss is infinite.
         """
+        origin, direction = columns(origin, direction)
         again = len(self._faces) >= FEWEST_AROUND
         if self._library is None:
-            primitive, distance = self._nearest_singly(origin, direction)
+            begin, towards = rows_of(origin), rows_of(direction)
+            primitive, distance = self._nearest_singly(begin, towards)
             missed = np.flatnonzero(primitive < 0)
             if again and len(missed):
-                primitive[missed], distance[missed] = self._nearest_singly(origin[missed], turned(direction[missed]))
+                primitive[missed], distance[missed] = self._nearest_singly(begin[missed], turned(towards[missed]))
             return primitive, distance
-        primitive = np.empty(len(origin), dtype=np.int32)
-        distance = np.empty(len(origin), dtype=np.float32)
+        primitive = np.empty(len(origin.x), dtype=np.int32)
+        distance = np.empty(len(origin.x), dtype=np.float32)
         room = _room_of(self._library)
         search = Search(self._library.intersect, self._scene, room.nearest_singly, room.nearest_together)
         trace_nearest(search, coherent, again, room.packet, origin, direction, primitive, distance)
@@ -165,8 +171,8 @@ class EmbreeTriangles:
 
     def occluded(
         self,
-        origin: NDArray[np.float32],
-        direction: NDArray[np.float32],
+        origin: Vectors | NDArray[np.float32],
+        direction: Vectors | NDArray[np.float32],
         reach: NDArray[np.float32],
         blocked: NDArray[np.uint8],
         coherent: bool = True,
@@ -174,14 +180,16 @@ class EmbreeTriangles:
         """Mark the rays that meet a triangle nearer than their reach.
 
         Args:
-            origin, direction: (n, 3) float32, C-contiguous, finite.
+            origin, direction: of n rays, finite; columns, or (n, 3) float32.
             reach: (n,) float32 in lengths of the direction; its values are lost.
             blocked: (n,) uint8, written: 1 for a blocked ray, else 0.
             coherent: as above.
         """
+        origin, direction = columns(origin, direction)
         if self._library is None:
             # Embree answers 0 for a blocked ray and -1 for a clear one.
-            np.equal(self.yardstick.run(origin, direction, reach, "OCCLUDED"), 0, out=blocked.view(np.bool_))
+            answers = self.yardstick.run(rows_of(origin), rows_of(direction), reach, "OCCLUDED")
+            np.equal(answers, 0, out=blocked.view(np.bool_))
             return
         room = _room_of(self._library)
         together = room.occluded_together if coherent else room.occluded_singly
@@ -302,7 +310,7 @@ def _agree(found: Library) -> bool:
     rng = np.random.default_rng(4)
     vertices = rng.uniform(-1, 1, (300, 3)).astype(np.float32)
     faces = np.arange(300, dtype=np.int32).reshape(-1, 3)
-    origin, direction = (rng.uniform(-1, 1, (203, 3)).astype(np.float32) for _ in range(2))
+    origin, direction = (vectors_of(rng.uniform(-1, 1, (203, 3)).astype(np.float32)) for _ in range(2))
     reach = rng.uniform(0, 2, 203).astype(np.float32)
     singly, together = EmbreeTriangles(vertices, faces, singly=True), EmbreeTriangles(vertices, faces, singly=True)
     together._library = found

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 
 from renderer.kernel import formula
-from renderer.lanes import size
+from renderer.lanes import root, size
 from renderer.surface import Surface
 
 
@@ -28,7 +28,7 @@ def pencil_spread(side: int, points: int, pixel: float, inverse: float) -> float
         pixel: side of a pixel at distance 1 along the view.
         inverse: 1 over the distance to the pixel, in the same units, at most 1.
     """
-    return side * (pixel / math.sqrt(points)) * inverse * math.sqrt(inverse)
+    return side * (pixel / math.sqrt(points)) * inverse * root(inverse)
 
 
 @formula

@@ -207,3 +207,112 @@ def _keep_plainly(room: Any, row: int, value: Any) -> None:
 keep: Any = either(intrinsic(_keep), _keep_plainly)
 """keep(room, row, value): write numbers, or marks as 0 and 1, to a row of a (n, LANES) float64 or float32 array, or
 whole numbers to one of int32."""
+
+
+def _along(_context: Any, column: Any, first: Any, last: Any) -> Any:
+    def generate(target: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        start, end = (
+            target.cast(builder, value, given, types.int64)
+            for value, given in zip(arguments[1:], (first, last), strict=True)
+        )
+        kind = column.dtype
+        row = _element(target, builder, kind, _place(target, builder, column, arguments[0], [start]), LANES)
+        final = _element(target, builder, kind, _place(target, builder, column, arguments[0], [end]))
+        numbers = builder.add(spread(builder, start), ir.Constant(vector(types.int64), list(range(LANES))))
+        inside = builder.icmp_signed("<=", numbers, spread(builder, end))
+        return _widened(builder, kind, builder.select(inside, row, spread(builder, final)), lanes=True)
+
+    return Lanes(_wide(column.dtype))(column, first, last), generate
+
+
+along: Any = either(
+    intrinsic(_along), lambda column, first, last: _plain_entry(column, np.minimum(first + np.arange(LANES), last))
+)
+"""along(column, first, last): LANES numbers of a C-contiguous 1-D array from `first` on, beyond `last` that one again;
+there has to be memory behind it, as `rays.make_columns` has it."""
+
+
+def _narrowed(target: Any, builder: Any, kind: Any, value: Any, given: Any) -> Any:
+    """Numbers or lanes as lanes of what an array is made of, float32 or int32."""
+    if isinstance(kind, types.Float):
+        lanes = as_lanes(target, builder, value, given, types.float64)
+        return builder.fptrunc(lanes, ir.VectorType(ir.FloatType(), LANES))
+    lanes = as_lanes(target, builder, value, given, types.int64)
+    return builder.trunc(lanes, ir.VectorType(ir.IntType(32), LANES))
+
+
+def _put(_context: Any, column: Any, first: Any, value: Any) -> Any:
+    def generate(target: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        lanes = _narrowed(target, builder, column.dtype, arguments[2], value)
+        start = target.cast(builder, arguments[1], first, types.int64)
+        address = _place(target, builder, column, arguments[0], [start])
+        written = builder.store(lanes, builder.inttoptr(address, lanes.type.as_pointer()))
+        written.align = 4
+        return target.get_dummy_value()
+
+    return types.void(column, first, value), generate
+
+
+def _put_plainly(column: Any, first: int, value: Any) -> None:
+    count = min(LANES, len(column) - first)
+    column[first : first + count] = np.broadcast_to(value, LANES)[:count]
+
+
+put: Any = either(intrinsic(_put), _put_plainly)
+"""put(column, first, value): write lanes side by side into a C-contiguous 1-D array of float32 or int32, from `first`
+on; behind its end there has to be memory, as `rays.make_columns` has it."""
+
+
+def _put_marked(_context: Any, column: Any, first: Any, mark: Any, value: Any) -> Any:
+    def generate(target: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        lanes = _narrowed(target, builder, column.dtype, arguments[3], value)
+        start = target.cast(builder, arguments[1], first, types.int64)
+        pointer = builder.inttoptr(
+            _place(target, builder, column, arguments[0], [start]), target.get_data_type(column.dtype).as_pointer()
+        )
+        shape = ir.FunctionType(ir.VoidType(), [lanes.type, pointer.type, arguments[2].type])
+        name = f"v{LANES}{'f' if isinstance(column.dtype, types.Float) else 'i'}32"
+        store = cgutils.get_or_insert_function(builder.module, shape, f"llvm.masked.compressstore.{name}")
+        builder.call(store, [lanes, pointer, arguments[2]])
+        return target.get_dummy_value()
+
+    return types.void(column, first, mark, value), generate
+
+
+def _put_marked_plainly(column: Any, first: int, mark: Any, value: Any) -> None:
+    chosen = np.broadcast_to(value, LANES)[mark]
+    column[first : first + len(chosen)] = chosen
+
+
+put_marked: Any = either(intrinsic(_put_marked), _put_marked_plainly)
+"""put_marked(column, first, mark, value): the same for the marked lanes alone, these side by side."""
+
+
+def _add_marked(_context: Any, table: Any, mark: Any, row: Any, red: Any, green: Any, blue: Any) -> Any:
+    def generate(target: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        array, marked, rows = arguments[:3]
+        columns = [
+            _narrowed(target, builder, table.dtype, value, given)
+            for value, given in zip(arguments[3:], (red, green, blue), strict=True)
+        ]
+        kind = target.get_data_type(table.dtype).as_pointer()
+        for lane in map(_INDEX, range(LANES)):
+            with builder.if_then(builder.extract_element(marked, lane)):
+                to = builder.extract_element(rows, lane)
+                for part, lanes in enumerate(columns):
+                    address = _place(target, builder, table, array, [to, _ADDRESS(part)])
+                    pointer = builder.inttoptr(address, kind)
+                    builder.store(builder.fadd(builder.load(pointer), builder.extract_element(lanes, lane)), pointer)
+        return target.get_dummy_value()
+
+    return types.void(table, mark, row, red, green, blue), generate
+
+
+def _add_marked_plainly(table: Any, mark: Any, row: Any, *values: Any) -> None:
+    for part, value in enumerate(values):
+        np.add.at(table, (row[mark], part), np.broadcast_to(value, LANES)[mark].astype(table.dtype))
+
+
+add_marked: Any = either(intrinsic(_add_marked), _add_marked_plainly)
+"""add_marked(table, mark, row, red, green, blue): add lanes, as float32, to the first three columns of rows of a 2-D
+array, where marked."""

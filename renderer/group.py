@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.gather import entry, held, keep, lane_numbers, pick
+from renderer.gather import along, entry, held, keep, lane_numbers, pick
 from renderer.kernel import formula
 from renderer.lanes import anywhere, choose, least
 from renderer.places import DENSITY, WEIGHTS, WIDTH, keep_some_surfaces, keep_surfaces
@@ -49,15 +49,16 @@ class Group(NamedTuple):
 @formula
 def group_of(rays: Rays, hits: Hits, first: int) -> Group:
     """Rays first, first + 1, ...; beyond the last one, that one again."""
-    row = least(lane_numbers(first), len(hits.primitive) - 1)
-    origin, direction, weight, pencil = rays.origin, rays.direction, rays.weight, rays.pencil
+    last = len(hits.primitive) - 1
+    row = least(lane_numbers(first), last)
+    origin, direction, weight = rays.origin, rays.direction, rays.weight
     return Group(
         row,
         entry(hits.primitive, row),
-        pick(origin, row, 0), pick(origin, row, 1), pick(origin, row, 2),
-        pick(direction, row, 0), pick(direction, row, 1), pick(direction, row, 2),
-        pick(weight, row, 0), pick(weight, row, 1), pick(weight, row, 2),
-        pick(pencil, row, 0) + pick(pencil, row, 1) * entry(hits.distance, row),
+        along(origin.x, first, last), along(origin.y, first, last), along(origin.z, first, last),
+        along(direction.x, first, last), along(direction.y, first, last), along(direction.z, first, last),
+        along(weight.x, first, last), along(weight.y, first, last), along(weight.z, first, last),
+        along(rays.width, first, last) + along(rays.spread, first, last) * entry(hits.distance, row),
     )  # fmt: skip
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from renderer.area_light import nearest_area_lights
 from renderer.embree import EmbreeTriangles
-from renderer.rays import Hits
+from renderer.rays import Hits, Vectors, columns
 from renderer.sphere import SphereTree, nearest_spheres, shade_spheres
 
 
@@ -58,13 +58,14 @@ class Intersector:
         other._area_lights = self._area_lights[:0]
         return other
 
-    def nearest(self, origin: NDArray[np.float32], direction: NDArray[np.float32]) -> Hits:
+    def nearest(self, origin: Vectors | NDArray[np.float32], direction: Vectors | NDArray[np.float32]) -> Hits:
         """Nearest hit of each ray.
 
         Args:
-            origin, direction: (n, 3) float32, C-contiguous, finite.
+            origin, direction: of n rays, finite; columns, or (n, 3) float32.
         """
-        n = _checked_length(origin, direction)
+        origin, direction = columns(origin, direction)
+        n = len(origin.x)
         if self._seen is None:
             hits = Hits(np.full(n, -1, dtype=np.int32), np.full(n, np.inf, dtype=np.float32))
         else:
@@ -77,15 +78,19 @@ class Intersector:
         return hits
 
     def occluded(
-        self, origin: NDArray[np.float32], direction: NDArray[np.float32], reach: NDArray[np.float32]
+        self,
+        origin: Vectors | NDArray[np.float32],
+        direction: Vectors | NDArray[np.float32],
+        reach: NDArray[np.float32],
     ) -> NDArray[np.uint8]:
         """Which shadow rays are blocked: (n,) uint8, 1 where something that casts shadows is nearer than `reach`.
 
         Args:
-            origin, direction: (n, 3) float32, C-contiguous, finite.
+            origin, direction: of n rays, finite; columns, or (n, 3) float32.
             reach: (n,) float32; its values are lost.
         """
-        n = _checked_length(origin, direction)
+        origin, direction = columns(origin, direction)
+        n = len(origin.x)
         assert reach.dtype == np.float32 and reach.shape == (n,)
         blocked = np.zeros(n, dtype=np.uint8)
         limit = reach.copy() if self._sphere_casts and self._casting is not None else reach
@@ -96,7 +101,7 @@ class Intersector:
         return blocked
 
     def bare_nearest(self, origin: NDArray[np.float32], direction: NDArray[np.float32]) -> None:
-        """embreex's own nearest-hit query and nothing else: the yardstick of the benchmark."""
+        """embreex's own nearest-hit query for (n, 3) rays and nothing else: the yardstick of the benchmark."""
         if self._seen is not None:
             self._seen.yardstick.run(origin, direction, None, "INTERSECT", output=True)
 
@@ -106,11 +111,3 @@ class Intersector:
         """embreex's own occlusion query and nothing else; the values of `reach` are lost."""
         if self._casting is not None:
             self._casting.yardstick.run(origin, direction, reach, "OCCLUDED")
-
-
-def _checked_length(origin: NDArray[np.float32], direction: NDArray[np.float32]) -> int:
-    n = len(origin)
-    for rays in (origin, direction):
-        if rays.dtype != np.float32 or rays.shape != (n, 3) or not rays.flags.c_contiguous:
-            raise ValueError(f"expected ({n}, 3) contiguous float32 rays, found {rays.shape} {rays.dtype}")
-    return n

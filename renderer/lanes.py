@@ -269,6 +269,18 @@ anywhere: Callable[[bool], bool] = either(intrinsic(_anywhere), lambda mark: boo
 """Whether any lane is marked."""
 
 
+def _how_many(_context: Any, mark: Any) -> Any:
+    def generate(_target: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        word = ir.IntType(LANES)
+        return builder.zext(builder.ctpop(builder.bitcast(arguments[0], word)), ir.IntType(64))
+
+    return types.int64(mark), generate
+
+
+how_many: Callable[[bool], int] = either(intrinsic(_how_many), lambda mark: int(np.count_nonzero(mark)))
+"""How many lanes are marked."""
+
+
 def _lane_by_lane(function: Callable[..., float]) -> Any:
     """A function of floats that the processor has no instruction for, with a mark before them: 0 where unmarked."""
 

@@ -16,7 +16,7 @@ from renderer.intersection import Intersector
 from renderer.kernel import kernel
 from renderer.media import crossed, dominant, with_medium
 from renderer.prepared import MATERIAL_COLUMN, OTHER_COLUMN, PreparedScene, Surfaces
-from renderer.rays import Hits
+from renderer.rays import Hits, Vectors, copied, some_vectors, vectors_of
 from renderer.surface import go_on_behind, sphere_met, surface_met
 
 MOST_HIDDEN = 64
@@ -32,8 +32,8 @@ OUTWARDS = (0.53766714, 0.79129217, 0.29137745)
 @kernel
 def find_hidden(
     surfaces: Surfaces,
-    origin: NDArray[np.float32],
-    direction: NDArray[np.float32],
+    origin: Vectors,
+    direction: Vectors,
     around: NDArray[np.int64],
     hits: Hits,
     rows: NDArray[np.int32],
@@ -45,8 +45,8 @@ def find_hidden(
 
     Args:
         surfaces: of the hits.
-        origin: (n, 3) float32 of the rays; those of the rays found are moved.
-        direction: (n, 3) float32.
+        origin: of n rays; those of the rays found are moved.
+        direction: theirs.
         around: (n,) int64 media of each ray; of the rays found, those behind the boundary.
         hits: what each ray met.
         rows: (k,) int32 rays to look at; those found are written to its front.
@@ -91,18 +91,18 @@ def find_hidden(
 @kernel
 def keep_origins(
     surfaces: Surfaces,
-    origin: NDArray[np.float32],
-    moved: NDArray[np.float32],
-    direction: NDArray[np.float32],
+    origin: Vectors,
+    moved: Vectors,
+    direction: Vectors,
     hits: Hits,
 ) -> None:
     """Move the rays that a sphere they are already through would otherwise take in: those that meet it again.
 
     Args:
         surfaces: of the hits.
-        origin: (n, 3) float32 where the rays began; some are replaced.
-        moved: (n, 3) float32 where they went on from.
-        direction: (n, 3) float32.
+        origin: where n rays began; some are replaced.
+        moved: where they went on from.
+        direction: theirs.
         hits: what they met in the end.
     """
     primitives, balls = hits.primitive, len(surfaces.spheres.radius)
@@ -114,14 +114,13 @@ def keep_origins(
         begun = sphere_met(surfaces.spheres, k, origin, direction, ray)
         gone_on = sphere_met(surfaces.spheres, k, moved, direction, ray)
         if begun.entering != gone_on.entering:
-            for axis in range(3):
-                origin[ray, axis] = moved[ray, axis]
+            origin.x[ray], origin.y[ray], origin.z[ray] = moved.x[ray], moved.y[ray], moved.z[ray]
 
 
 def pass_hidden(
     prepared: PreparedScene,
-    origin: NDArray[np.float32],
-    direction: NDArray[np.float32],
+    origin: Vectors,
+    direction: Vectors,
     around: NDArray[np.int64],
     hits: Hits,
 ) -> None:
@@ -129,15 +128,15 @@ def pass_hidden(
 
     Args:
         prepared: the scene.
-        origin: (n, 3) float32; moved only where the ray could not be traced again from where it began.
-        direction: (n, 3) float32.
+        origin: of n rays; moved only where the ray could not be traced again from where it began.
+        direction: theirs.
         around: (n,) int64 media of each ray, replaced by those where it meets something.
         hits: of the rays, replaced by those behind; distances still count from where a ray began.
     """
     surfaces, intersector = prepared.surfaces, prepared.intersector
     pierced = "cutouts" in prepared.plan.names
-    rows = np.arange(len(origin), dtype=np.int32)
-    passed, moved = np.zeros(len(origin), dtype=np.float32), origin.copy()
+    rows = np.arange(len(hits.primitive), dtype=np.int32)
+    passed, moved = np.zeros(len(rows), dtype=np.float32), copied(origin)
     entered = np.zeros(len(surfaces.indices), dtype=np.int64)
     gone_on = None
     for _ in range(MOST_HIDDEN):
@@ -146,24 +145,28 @@ def pass_hidden(
             gone_on = rows.copy()
         if len(rows) == 0:
             break
-        start, towards = moved[rows], direction[rows]
+        start, towards = some_vectors(moved, rows), some_vectors(direction, rows)
         behind = intersector.nearest(start, towards)
         if pierced:
             pass_holes(surfaces, intersector, start, towards, behind)
-            moved[rows] = start
+            _replace(moved, rows, start)
         for known, new in zip(hits, behind, strict=True):
             known[rows] = new
     if gone_on is None or len(gone_on) == 0:
         return
     hits.distance[:] += passed
     if pierced:
-        origin[gone_on] = moved[gone_on]
+        _replace(origin, gone_on, some_vectors(moved, gone_on))
         return
-    begun = origin[gone_on]
-    keep_origins(
-        surfaces, begun, moved[gone_on], direction[gone_on], Hits(hits.primitive[gone_on], hits.distance[gone_on])
-    )
-    origin[gone_on] = begun
+    begun, further, towards = (some_vectors(vectors, gone_on) for vectors in (origin, moved, direction))
+    keep_origins(surfaces, begun, further, towards, Hits(hits.primitive[gone_on], hits.distance[gone_on]))
+    _replace(origin, gone_on, begun)
+
+
+def _replace(vectors: Vectors, rows: NDArray[np.int32], others: Vectors) -> None:
+    """Put other vectors in the place of some."""
+    for column, other in zip(vectors, others, strict=True):
+        column[rows] = other
 
 
 def media_at(prepared: PreparedScene, place: NDArray[np.float32]) -> int:
@@ -188,8 +191,8 @@ def _look_outwards(
     surfaces: Surfaces, solids: Intersector, place: NDArray[np.float32], entered: NDArray[np.int64]
 ) -> None:
     """Follow one ray through all that there is, and count how often it enters each medium."""
-    origin = np.array([place], dtype=np.float32)
-    direction = np.array([OUTWARDS], dtype=np.float32) / np.float32(math.hypot(*OUTWARDS))
+    origin = vectors_of(np.array([place], dtype=np.float32))
+    direction = vectors_of(np.array([OUTWARDS], dtype=np.float32) / np.float32(math.hypot(*OUTWARDS)))
     around, passed = np.zeros(1, dtype=np.int64), np.zeros(1, dtype=np.float32)
     for _ in range(MOST_CROSSED):
         hits = solids.nearest(origin, direction)

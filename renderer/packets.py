@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.kernel import at, call, formula, kernel
+from renderer.rays import Vectors
 
 INVOKE_FILTER, COHERENT = 1 << 1, 1 << 16
 """Flags of a query."""
@@ -156,16 +157,18 @@ def keeper(width: int) -> Callable[[Any], None]:
 
 
 @formula
-def _load_ray(
-    packet: Packet, lane: int, origin: NDArray[np.float32], direction: NDArray[np.float32], ray: int, reach: np.float32
-) -> bool:
+def _load_ray(packet: Packet, lane: int, origin: Vectors, direction: Vectors, ray: int, reach: np.float32) -> bool:
     """Put one ray into a lane of a packet; True if it is parallel to a coordinate plane."""
     width, rows = packet.width, packet.rows
-    for axis in range(3):
-        rows[(ORIGIN + axis) * width + lane] = origin[ray, axis]
-        rows[(DIRECTION + axis) * width + lane] = direction[ray, axis]
+    x, y, z = direction.x[ray], direction.y[ray], direction.z[ray]
+    rows[ORIGIN * width + lane] = origin.x[ray]
+    rows[(ORIGIN + 1) * width + lane] = origin.y[ray]
+    rows[(ORIGIN + 2) * width + lane] = origin.z[ray]
+    rows[DIRECTION * width + lane] = x
+    rows[(DIRECTION + 1) * width + lane] = y
+    rows[(DIRECTION + 2) * width + lane] = z
     rows[FAR * width + lane] = reach
-    return _is_parallel(direction[ray, 0], direction[ray, 1], direction[ray, 2])
+    return _is_parallel(x, y, z)
 
 
 @formula
@@ -175,9 +178,7 @@ def _is_parallel(x: np.float32, y: np.float32, z: np.float32) -> bool:
 
 
 @formula
-def _load_lanes(
-    width: int, rows: NDArray[np.float32], origin: NDArray[np.float32], direction: NDArray[np.float32], first: int
-) -> bool:
+def _load_lanes(width: int, rows: NDArray[np.float32], origin: Vectors, direction: Vectors, first: int) -> bool:
     """Put rays into the lanes of a packet whose `width` is known to the compiler, which takes them together.
 
     Returns:
@@ -186,10 +187,10 @@ def _load_lanes(
     parallel = 0
     for lane in range(width):
         ray = np.uint64(first + lane)
-        x, y, z = direction[ray, 0], direction[ray, 1], direction[ray, 2]
-        rows[ORIGIN * width + lane] = origin[ray, 0]
-        rows[(ORIGIN + 1) * width + lane] = origin[ray, 1]
-        rows[(ORIGIN + 2) * width + lane] = origin[ray, 2]
+        x, y, z = direction.x[ray], direction.y[ray], direction.z[ray]
+        rows[ORIGIN * width + lane] = origin.x[ray]
+        rows[(ORIGIN + 1) * width + lane] = origin.y[ray]
+        rows[(ORIGIN + 2) * width + lane] = origin.z[ray]
         rows[DIRECTION * width + lane] = x
         rows[(DIRECTION + 1) * width + lane] = y
         rows[(DIRECTION + 2) * width + lane] = z
@@ -198,9 +199,7 @@ def _load_lanes(
 
 
 @formula
-def _load_packet(
-    packet: Packet, origin: NDArray[np.float32], direction: NDArray[np.float32], first: int, count: int
-) -> bool:
+def _load_packet(packet: Packet, origin: Vectors, direction: Vectors, first: int, count: int) -> bool:
     """Put `count` rays into a packet, but for their reach; True if one is parallel to a coordinate plane."""
     rows, valid = packet.rows, packet.valid
     for lane in range(packet.width):
@@ -243,8 +242,8 @@ def trace_nearest(
     coherent: bool,
     again: bool,
     packet: Packet,
-    origin: NDArray[np.float32],
-    direction: NDArray[np.float32],
+    origin: Vectors,
+    direction: Vectors,
     primitive: NDArray[np.int32],
     distance: NDArray[np.float32],
 ) -> None:
@@ -283,8 +282,8 @@ def _search(
     search: Search,
     packed: bool,
     packet: Packet,
-    origin: NDArray[np.float32],
-    direction: NDArray[np.float32],
+    origin: Vectors,
+    direction: Vectors,
     first: int,
     turned: bool,
 ) -> None:
@@ -313,8 +312,8 @@ def _search_again(
     search: Search,
     coherent: bool,
     packet: Packet,
-    origin: NDArray[np.float32],
-    direction: NDArray[np.float32],
+    origin: Vectors,
+    direction: Vectors,
     first: int,
     count: int,
 ) -> None:
@@ -333,8 +332,8 @@ def _search_again(
 def trace_occluded(
     search: Search,
     packet: Packet,
-    origin: NDArray[np.float32],
-    direction: NDArray[np.float32],
+    origin: Vectors,
+    direction: Vectors,
     reach: NDArray[np.float32],
     blocked: NDArray[np.uint8],
 ) -> None:

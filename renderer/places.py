@@ -23,11 +23,12 @@ DENSITY = 33
 MIRRORED = 34
 EYE = 37
 WIDTH = 40
-ROWS = 41
+TURN = 41
+ROWS = 42
 """Rows of `Places.rows`: the 15 numbers of a surface with MATERIAL and ENTERING
 among them, the 16 of its finish with CALLS among them, the weights of a
-triangle's second and third corner, texture coordinates per scene unit, what it mirrors, the direction to the eye, and
-the width of the ray; ROWS of them."""
+triangle's second and third corner, texture coordinates per scene unit, what it mirrors, the direction to the eye, the
+width of the ray, and how many rays of the same sample are right before it; ROWS of them."""
 
 REFRACTED, MIRRORED_ON = 0, 11
 GOES, FROM, TOWARDS, SHARE, SPREAD = 0, 1, 4, 7, 10

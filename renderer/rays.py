@@ -1,29 +1,50 @@
-"""The records that flow between the stages of the tracer: rays, hits and shadow rays."""
+"""The records that flow between the stages of the tracer: rays, hits and shadow rays.
+
+Each part of them is a column of its own, of which kernels read and write as many as go side by side at once.
+"""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from renderer.lanes import LANES
+
+PAGE, STAGGER = 4096, 320
+"""Bytes after which places in a core's first cache recur, and by how many of them columns lie apart."""
+
+
+class Vectors(NamedTuple):
+    """Points, directions or colours.
+
+    Attributes:
+        x, y, z: (n,) float32, C-contiguous; of colours red, green and blue.
+    """
+
+    x: NDArray[np.float32]
+    y: NDArray[np.float32]
+    z: NDArray[np.float32]
 
 
 class Rays(NamedTuple):
     """Rays on their way, in scene units.
 
     Attributes:
-        origin, direction: (n, 3) float32; directions are of unit length.
-        weight: (n, 3) float32 share of what the ray sees that reaches the eye.
+        origin, direction: n of each; directions are of unit length.
+        weight: share of what the ray sees that reaches the eye.
         sample: (n,) int32 camera sample of the block it belongs to; rising along the array.
-        pencil: (n, 2) float32 its width at the origin, and what it gains per scene unit; see `footprint`.
+        width, spread: (n,) float32 its width at the origin, and what it gains per scene unit; see `footprint`.
         around: (n,) int64 the media it is in, see `media`; only in scenes that have some.
     """
 
-    origin: NDArray[np.float32]
-    direction: NDArray[np.float32]
-    weight: NDArray[np.float32]
+    origin: Vectors
+    direction: Vectors
+    weight: Vectors
     sample: NDArray[np.int32]
-    pencil: NDArray[np.float32]
+    width: NDArray[np.float32]
+    spread: NDArray[np.float32]
     around: NDArray[np.int64]
 
 
@@ -31,16 +52,16 @@ class ShadowRays(NamedTuple):
     """Rays towards a light, with what arrives if nothing is in between.
 
     Attributes:
-        origin, direction: (n, 3) float32; directions lead right to the light, in scene units.
+        origin, direction: n of each; directions lead right to the light, in scene units.
         reach: (n,) float32 where to stop looking, in lengths of the direction: just before 1.
-        light: (n, 3) float32 radiance that the sample gains if the light is seen.
+        light: radiance that the sample gains if the light is seen.
         sample: (n,) int32 camera sample of the block.
     """
 
-    origin: NDArray[np.float32]
-    direction: NDArray[np.float32]
+    origin: Vectors
+    direction: Vectors
     reach: NDArray[np.float32]
-    light: NDArray[np.float32]
+    light: Vectors
     sample: NDArray[np.int32]
 
 
@@ -57,44 +78,93 @@ class Hits(NamedTuple):
     distance: NDArray[np.float32]
 
 
+def vectors_of(rows: NDArray[np.float32]) -> Vectors:
+    """(n, 3) float32 as columns, copied.
+
+    Raises:
+        ValueError: if it is anything else.
+    """
+    if rows.dtype != np.float32 or rows.ndim != 2 or rows.shape[1] != 3:
+        raise ValueError(f"expected (n, 3) float32, found {rows.shape} {rows.dtype}")
+    return Vectors(*(np.ascontiguousarray(rows[:, axis]) for axis in range(3)))
+
+
+def columns(origin: Vectors | NDArray[np.float32], direction: Vectors | NDArray[np.float32]) -> tuple[Vectors, Vectors]:
+    """Rays as columns, which they may be already.
+
+    Raises:
+        ValueError: if one is neither that nor (n, 3) float32, or if there are more of the one than of the other.
+    """
+    begin, towards = (given if isinstance(given, Vectors) else vectors_of(given) for given in (origin, direction))
+    if len(begin.x) != len(towards.x):
+        raise ValueError(f"expected as many directions as origins, found {len(towards.x)} and {len(begin.x)}")
+    return begin, towards
+
+
+def rows_of(vectors: Vectors) -> NDArray[np.float32]:
+    """The same as (n, 3) float32, C-contiguous."""
+    return np.stack(vectors, axis=1)
+
+
+def some_vectors(vectors: Vectors, chosen: slice | NDArray[np.integer]) -> Vectors:
+    """Those that are chosen; of a slice without a copy."""
+    x, y, z = vectors
+    return Vectors(x[chosen], y[chosen], z[chosen])
+
+
+def copied(vectors: Vectors) -> Vectors:
+    """A copy."""
+    return Vectors(vectors.x.copy(), vectors.y.copy(), vectors.z.copy())
+
+
 def some_rays(rays: Rays, start: int, stop: int) -> Rays:
     """Rays start .. stop - 1, without a copy."""
     part = slice(start, stop)
     return Rays(
-        rays.origin[part],
-        rays.direction[part],
-        rays.weight[part],
+        some_vectors(rays.origin, part),
+        some_vectors(rays.direction, part),
+        some_vectors(rays.weight, part),
         rays.sample[part],
-        rays.pencil[part],
+        rays.width[part],
+        rays.spread[part],
         rays.around[part],
     )
 
 
 def first_shadow_rays(rays: ShadowRays, count: int) -> ShadowRays:
     """The first `count` shadow rays, without a copy."""
+    part = slice(count)
     return ShadowRays(
-        rays.origin[:count], rays.direction[:count], rays.reach[:count], rays.light[:count], rays.sample[:count]
+        some_vectors(rays.origin, part),
+        some_vectors(rays.direction, part),
+        rays.reach[part],
+        some_vectors(rays.light, part),
+        rays.sample[part],
     )
+
+
+def make_columns(count: int, capacity: int, kind: Any = np.float32) -> list[NDArray[Any]]:
+    """`count` columns of (capacity,) zeros, with memory behind each that LANES numbers at once may run into.
+
+    They lie STAGGER bytes apart but for whole pages: what stands in the same row of several would otherwise contend for
+    the same few places in a core's first cache.
+    """
+    size = np.dtype(kind).itemsize
+    apart = -(-(capacity + LANES) * size // PAGE) * PAGE + STAGGER
+    room = np.zeros(count * apart // size, dtype=kind)
+    return [room[start : start + capacity] for start in range(0, len(room), apart // size)]
 
 
 def make_rays(capacity: int) -> Rays:
     """Room for `capacity` rays."""
+    columns = make_columns(11, capacity)
+    (sample,), (around,) = make_columns(1, capacity, np.int32), make_columns(1, capacity, np.int64)
     return Rays(
-        origin=np.zeros((capacity, 3), dtype=np.float32),
-        direction=np.zeros((capacity, 3), dtype=np.float32),
-        weight=np.zeros((capacity, 3), dtype=np.float32),
-        sample=np.zeros(capacity, dtype=np.int32),
-        pencil=np.zeros((capacity, 2), dtype=np.float32),
-        around=np.zeros(capacity, dtype=np.int64),
+        Vectors(*columns[:3]), Vectors(*columns[3:6]), Vectors(*columns[6:9]), sample, columns[9], columns[10], around
     )
 
 
 def make_shadow_rays(capacity: int) -> ShadowRays:
     """Room for `capacity` shadow rays."""
-    return ShadowRays(
-        origin=np.zeros((capacity, 3), dtype=np.float32),
-        direction=np.zeros((capacity, 3), dtype=np.float32),
-        reach=np.zeros(capacity, dtype=np.float32),
-        light=np.zeros((capacity, 3), dtype=np.float32),
-        sample=np.zeros(capacity, dtype=np.int32),
-    )
+    columns, (sample,) = make_columns(10, capacity), make_columns(1, capacity, np.int32)
+    return ShadowRays(Vectors(*columns[:3]), Vectors(*columns[3:6]), columns[6], Vectors(*columns[7:]), sample)

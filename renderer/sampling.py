@@ -15,7 +15,9 @@ from numpy.typing import NDArray
 
 from renderer.camera import ViewFrame
 from renderer.footprint import pencil_spread
-from renderer.kernel import formula, kernel
+from renderer.gather import held, lane_numbers, put
+from renderer.kernel import formula, roomy_kernel
+from renderer.lanes import LANES, root
 from renderer.rays import Rays
 
 GOLDEN = np.uint64(0x9E3779B97F4A7C15)
@@ -89,7 +91,7 @@ def lattice_shift(step: int, points: int) -> float:
     return 0.5 * shared if points // shared % 2 == 0 else 0.0
 
 
-@kernel
+@roomy_kernel
 def camera_rays(
     view: ViewFrame,
     origin: NDArray[np.float32],
@@ -120,13 +122,8 @@ def camera_rays(
         order: stride in which its points are visited.
         rays: room for all of them.
     """
-    corner, step_x, step_y = view.corner, view.step_x, view.step_y
-    origins, directions, weights, sample_of = rays.origin, rays.direction, rays.weight, rays.sample
-    pencils = rays.pencil
-    wide_step = step_x[0] * step_x[0] + step_x[1] * step_x[1] + step_x[2] * step_x[2]
-    high_step = step_y[0] * step_y[0] + step_y[1] * step_y[1] + step_y[2] * step_y[2]
-    pixel = math.sqrt(math.sqrt(wide_step) * math.sqrt(high_step))
     shift_u, shift_v = lattice_shift(1, points), lattice_shift(step, points)
+    places = np.zeros((3, LANES))
     ray = 0
     for index in range(len(cells)):
         cell = cells[index]
@@ -143,15 +140,50 @@ def camera_rays(
                 word = mix(seed + np.uint64(sample) * GOLDEN)
                 u = (np.float64(word >> np.uint64(32)) + 0.5) * TO_UNIT
                 v = (np.float64(word & np.uint64(0xFFFFFFFF)) + 0.5) * TO_UNIT
-            px, py = left + u * wide, top + v * high
-            dx = corner[0] + px * step_x[0] + py * step_y[0]
-            dy = corner[1] + px * step_x[1] + py * step_y[1]
-            dz = corner[2] + px * step_x[2] + py * step_y[2]
-            inverse = 1.0 / np.sqrt(dx * dx + dy * dy + dz * dz)
-            directions[ray, 0], directions[ray, 1], directions[ray, 2] = dx * inverse, dy * inverse, dz * inverse
-            for axis in range(3):
-                origins[ray, axis] = origin[axis]
-                weights[ray, axis] = 1.0
-            sample_of[ray] = ray
-            pencils[ray, 0], pencils[ray, 1] = 0.0, pencil_spread(side[cell], points, pixel, inverse)
+            lane = ray % LANES
+            places[0, lane], places[1, lane], places[2, lane] = left + u * wide, top + v * high, side[cell]
             ray += 1
+            if lane == LANES - 1:
+                _aim(view, origin, points, places, ray - LANES, rays)
+    if ray % LANES > 0:
+        _aim(view, origin, points, places, ray - ray % LANES, rays)
+
+
+@formula
+def _aim(
+    view: ViewFrame,
+    origin: NDArray[np.float32],
+    points: int,
+    places: NDArray[np.float64],
+    first: int,
+    rays: Rays,
+) -> None:
+    """Write LANES rays, from `first` on, through places on the screen.
+
+    Args:
+        view, origin, points: of `camera_rays`.
+        places: (3, LANES) float64 x and y of the places, and the sides of their cells [px].
+        first: number of the first ray.
+        rays: written.
+    """
+    corner, across, down = view.corner, view.step_x, view.step_y
+    px, py, side = held(places, 0), held(places, 1), held(places, 2)
+    dx = corner[0] + px * across[0] + py * down[0]
+    dy = corner[1] + px * across[1] + py * down[1]
+    dz = corner[2] + px * across[2] + py * down[2]
+    inverse = 1.0 / root(dx * dx + dy * dy + dz * dz)
+    wide = across[0] * across[0] + across[1] * across[1] + across[2] * across[2]
+    high = down[0] * down[0] + down[1] * down[1] + down[2] * down[2]
+    pixel = root(root(wide) * root(high))
+    put(rays.origin.x, first, origin[0])
+    put(rays.origin.y, first, origin[1])
+    put(rays.origin.z, first, origin[2])
+    put(rays.direction.x, first, dx * inverse)
+    put(rays.direction.y, first, dy * inverse)
+    put(rays.direction.z, first, dz * inverse)
+    put(rays.weight.x, first, 1.0)
+    put(rays.weight.y, first, 1.0)
+    put(rays.weight.z, first, 1.0)
+    put(rays.sample, first, lane_numbers(first))
+    put(rays.width, first, 0.0)
+    put(rays.spread, first, pencil_spread(side, points, pixel, inverse))

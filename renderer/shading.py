@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.finishing import finish_off
-from renderer.gather import entry, pick
+from renderer.gather import add_marked, along, entry, held, keep, lane_numbers
 from renderer.group import group_of, meet
-from renderer.kernel import kernel, prefetch
+from renderer.kernel import formula, kernel, prefetch
 from renderer.lanes import LANES, anywhere, whole
 from renderer.light_samples import LightSamples
 from renderer.lighting import light_beyond, light_up
 from renderer.material_table import LIT, SPAWNS
-from renderer.places import CALLS, SENT, Places
+from renderer.places import CALLS, SENT, TURN, Places
 from renderer.prepared import Surfaces
 from renderer.rays import Hits, Rays, ShadowRays
 from renderer.shadow_rays import ask_area_lights, ask_point_lights
@@ -25,6 +25,24 @@ from renderer.spawning import CHILDREN, SHADOWS, send_on, write_children
 
 AHEAD = 2 * LANES
 """How many rays ahead a triangle is fetched from memory: its latency over the time of one ray."""
+
+
+@formula
+def _take_turns(sample_of: NDArray[np.int32], first: int, n: int, rows: NDArray[np.float64]) -> int:
+    """Write how many rays of the same sample are right before each of a group; return how many turns that makes.
+
+    Rays of a sample add to it turn by turn: in their order, whatever else is in the group.
+    """
+    keep(rows, TURN, 0.0)
+    alike = along(sample_of, first, n - 1) == along(sample_of, first + 1, n - 1)
+    if not anywhere(alike & (lane_numbers(first) < n - 1)):
+        return 1
+    turns = turn = 0
+    for lane in range(1, min(LANES, n - first)):
+        turn = turn + 1 if sample_of[first + lane] == sample_of[first + lane - 1] else 0
+        rows[TURN, lane] = turn
+        turns = max(turns, turn)
+    return turns + 1
 
 
 @kernel
@@ -66,30 +84,29 @@ def shade(
         for ray in range(first + AHEAD, min(first + AHEAD + LANES, n)):
             prefetch(facets, max(0, entry(primitive_of, ray)))
         group = group_of(rays, hits, first)
-        seen = (group.primitive >= 0) & (group.primitive < solids)
+        inside = lane_numbers(first) < n
+        seen = inside & (group.primitive >= 0) & (group.primitive < solids)
+        lit, count = seen & False, min(LANES, n - first)
         if anywhere(seen):
             meet(surfaces, group, rows)
             s, finish = finish_off(surfaces, group, seen, rows)
             light_up(surfaces, group, seen, s, finish, places)
+            lit = finish.calls & LIT != 0
             if spawn and anywhere(finish.calls & SPAWNS != 0):
                 send_on(surfaces, rays, primitive_of, first, group, seen, s, finish, cutoff, places)
+                n_children = write_children(places, sample_of, first, count, nested, children, n_children, counters)
         light_beyond(surfaces, group, seen, places)
-        for ray in range(first, min(first + LANES, n)):
-            # Unsigned, so that no code looks for indices that count from the end.
-            lane, sample, primitive = ray - first, np.uint64(entry(sample_of, ray)), entry(primitive_of, ray)
-            radiance[sample, 0] += pick(light, SENT, lane)
-            radiance[sample, 1] += pick(light, SENT + 1, lane)
-            radiance[sample, 2] += pick(light, SENT + 2, lane)
-            if primitive < 0 or primitive >= solids:
-                continue
-            calls = whole(pick(rows, CALLS, lane))
-            if calls & LIT != 0:
-                n_shadows = ask_point_lights(light, point_lights, lane, sample, radiance, shadows, n_shadows)
-                if area_lights > 0:
-                    n_shadows = ask_area_lights(
-                        surfaces, rays, ray, rows, lane, draws, radiance, shadows, n_shadows
-                    )  # fmt: skip
-            if spawn and calls & SPAWNS != 0:
-                n_children = write_children(places, lane, sample, nested, children, n_children, counters)
+        turns, sample = _take_turns(sample_of, first, n, rows), along(sample_of, first, n - 1)
+        for turn in range(turns):
+            marked = inside & (held(rows, TURN) == turn)
+            add_marked(radiance, marked, sample, held(light, SENT), held(light, SENT + 1), held(light, SENT + 2))
+            marked = marked & lit
+            if anywhere(marked):
+                n_shadows = ask_point_lights(light, point_lights, marked, sample, radiance, shadows, n_shadows)
+                for lane in range(count if area_lights > 0 else 0):
+                    if rows[TURN, lane] == turn and whole(rows[CALLS, lane]) & LIT != 0:
+                        n_shadows = ask_area_lights(
+                            surfaces, rays, first + lane, rows, lane, draws, radiance, shadows, n_shadows
+                        )  # fmt: skip
     counters[CHILDREN] = n_children
     counters[SHADOWS] = n_shadows

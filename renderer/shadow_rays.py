@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from renderer.area_light import see_light, towards_light
-from renderer.gather import pick
+from renderer.gather import add_marked, held, put_marked
 from renderer.kernel import formula, kernel
+from renderer.lanes import anywhere, how_many
 from renderer.light_samples import LightSamples, light_sample, light_seed
 from renderer.lighting import in_front
 from renderer.places import EYE, LIGHT_ROWS, LIGHTS, START, finish_of, surface_of
@@ -23,21 +25,21 @@ from renderer.surface import OFFSET_ULPS, Surface
 def ask_point_lights(
     light: NDArray[np.float32],
     lights: int,
-    lane: int,
-    sample: np.uint64,
+    marked: Any,
+    sample: Any,
     radiance: NDArray[np.float32],
     shadows: ShadowRays,
     n_shadows: int,
 ) -> int:
-    """Write the shadow rays of one place to point lights, or add the light of those that cast none.
+    """Write the shadow rays of some places to point lights, or add the light of those that cast none.
 
     Args:
         light: of `Places`.
         lights: how many there are.
-        lane: which place.
-        sample: camera sample of the block.
+        marked: the places, all of different samples.
+        sample: camera sample of each.
         radiance: (samples, 3) float32, added to.
-        shadows: shadow rays; room for another `lights`.
+        shadows: shadow rays; room for another `lights` of each place.
         n_shadows: how many there are.
 
     Returns:
@@ -45,25 +47,24 @@ def ask_point_lights(
     """
     origin, direction, reach, carried, sample_of = shadows
     for row in range(LIGHTS, LIGHTS + LIGHT_ROWS * lights, LIGHT_ROWS):
-        far = pick(light, row + 3, lane)
-        if far > 0.0:
-            to = np.uint64(n_shadows)
-            origin[to, 0] = pick(light, START, lane)
-            origin[to, 1] = pick(light, START + 1, lane)
-            origin[to, 2] = pick(light, START + 2, lane)
-            direction[to, 0] = pick(light, row, lane)
-            direction[to, 1] = pick(light, row + 1, lane)
-            direction[to, 2] = pick(light, row + 2, lane)
-            reach[to] = far
-            carried[to, 0] = pick(light, row + 4, lane)
-            carried[to, 1] = pick(light, row + 5, lane)
-            carried[to, 2] = pick(light, row + 6, lane)
-            sample_of[to] = sample
-            n_shadows += 1
-        elif far == 0.0:
-            radiance[sample, 0] += pick(light, row + 4, lane)
-            radiance[sample, 1] += pick(light, row + 5, lane)
-            radiance[sample, 2] += pick(light, row + 6, lane)
+        far = held(light, row + 3)
+        red, green, blue = held(light, row + 4), held(light, row + 5), held(light, row + 6)
+        asks, adds = marked & (far > 0.0), marked & (far == 0.0)
+        if anywhere(asks):
+            put_marked(origin.x, n_shadows, asks, held(light, START))
+            put_marked(origin.y, n_shadows, asks, held(light, START + 1))
+            put_marked(origin.z, n_shadows, asks, held(light, START + 2))
+            put_marked(direction.x, n_shadows, asks, held(light, row))
+            put_marked(direction.y, n_shadows, asks, held(light, row + 1))
+            put_marked(direction.z, n_shadows, asks, held(light, row + 2))
+            put_marked(reach, n_shadows, asks, far)
+            put_marked(carried.x, n_shadows, asks, red)
+            put_marked(carried.y, n_shadows, asks, green)
+            put_marked(carried.z, n_shadows, asks, blue)
+            put_marked(sample_of, n_shadows, asks, sample)
+            n_shadows += how_many(asks)
+        if anywhere(adds):
+            add_marked(radiance, adds, sample, red, green, blue)
     return n_shadows
 
 
@@ -103,16 +104,16 @@ def _send(
         radiance[sample, 2] += blue
         return n_shadows
     away = s.offset + s.lift
-    shadows.origin[n_shadows, 0] = s.px + away * s.gx
-    shadows.origin[n_shadows, 1] = s.py + away * s.gy
-    shadows.origin[n_shadows, 2] = s.pz + away * s.gz
-    shadows.direction[n_shadows, 0] = tx - away * s.gx
-    shadows.direction[n_shadows, 1] = ty - away * s.gy
-    shadows.direction[n_shadows, 2] = tz - away * s.gz
+    shadows.origin.x[n_shadows] = s.px + away * s.gx
+    shadows.origin.y[n_shadows] = s.py + away * s.gy
+    shadows.origin.z[n_shadows] = s.pz + away * s.gz
+    shadows.direction.x[n_shadows] = tx - away * s.gx
+    shadows.direction.y[n_shadows] = ty - away * s.gy
+    shadows.direction.z[n_shadows] = tz - away * s.gz
     shadows.reach[n_shadows] = reach
-    shadows.light[n_shadows, 0] = red
-    shadows.light[n_shadows, 1] = green
-    shadows.light[n_shadows, 2] = blue
+    shadows.light.x[n_shadows] = red
+    shadows.light.y[n_shadows] = green
+    shadows.light.z[n_shadows] = blue
     shadows.sample[n_shadows] = sample
     return n_shadows + 1
 
@@ -145,7 +146,7 @@ def ask_area_lights(
     """
     s, finish = surface_of(rows, lane), finish_of(rows, lane)
     lights, sample, weight = surfaces.area_lights, rays.sample[ray], rays.weight
-    wr, wg, wb = np.float64(weight[ray, 0]), np.float64(weight[ray, 1]), np.float64(weight[ray, 2])
+    wr, wg, wb = np.float64(weight.x[ray]), np.float64(weight.y[ray]), np.float64(weight.z[ray])
     vx, vy, vz = rows[EYE, lane], rows[EYE + 1, lane], rows[EYE + 2, lane]
     each = draws.each if draws.depth == 0 else 1
     for index in range(len(lights)):
@@ -195,6 +196,6 @@ def add_unblocked(shadows: ShadowRays, blocked: NDArray[np.uint8], radiance: NDA
     for ray in range(len(blocked)):
         if blocked[ray] == 0:
             sample = sample_of[ray]
-            radiance[sample, 0] += light[ray, 0]
-            radiance[sample, 1] += light[ray, 1]
-            radiance[sample, 2] += light[ray, 2]
+            radiance[sample, 0] += light.x[ray]
+            radiance[sample, 1] += light.y[ray]
+            radiance[sample, 2] += light.z[ray]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from renderer.finish import Finish
 from renderer.footprint import mirrored_spread, refracted_spread
 from renderer.fresnel import fresnel, refracted_cosine
-from renderer.gather import entry, held, keep, pick
+from renderer.gather import entry, held, keep
 from renderer.group import Group
 from renderer.kernel import formula
 from renderer.lanes import LANES, anywhere, choose, most, root
@@ -165,7 +165,7 @@ def send_on(
     dx, dy, dz = group.dx, group.dy, group.dz
     mr, mg, mb = held(rows, MIRRORED), held(rows, MIRRORED + 1), held(rows, MIRRORED + 2)
     anyway = choose(most(group.wr, most(group.wg, group.wb)) >= cutoff, calls, 0)
-    curvature, spread = _curvature(surfaces, group, seen, s), pick(rays.pencil, group.row, 1)
+    curvature, spread = _curvature(surfaces, group, seen, s), entry(rays.spread, group.row)
     ior = entry(materials["ior"], row)
     keep(children, ETA, choose(s.entering, 1.0 / ior, ior))
     if len(surfaces.indices) > 1:
@@ -206,37 +206,43 @@ def send_on(
 @formula
 def write_children(
     places: Places,
-    lane: int,
-    sample: np.uint64,
+    sample_of: NDArray[np.int32],
+    first: int,
+    count: int,
     nested: bool,
     children: Rays,
     n_children: int,
     counters: NDArray[np.int64],
 ) -> int:
-    """Write the rays that one surface sends on, as `send_on` left them; returns how many children there are now.
+    """Write the rays that a group sends on, as `send_on` left them; returns how many children there are now.
 
     Args:
-        places, lane: which surface.
-        sample: camera sample of the block.
+        places: of the group.
+        sample_of: (n,) int32 camera samples of all rays.
+        first, count: rays first .. first + count - 1 are of the group.
         nested: whether the rays carry the media they are in.
-        children: room for another two.
+        children: room for another two of each.
         n_children: how many there are.
         counters: (COUNTERS,) int64, added to.
     """
-    sent, origin, direction, weight, pencil = (
-        places.children, children.origin, children.direction, children.weight, children.pencil,
-    )  # fmt: skip
-    for kind in (REFRACTED, MIRRORED_ON):
-        if sent[kind + GOES, lane] != 0.0:
+    sent, origin, direction, weight = places.children, children.origin, children.direction, children.weight
+    for lane in range(count):
+        for kind in (REFRACTED, MIRRORED_ON):
+            if sent[kind + GOES, lane] == 0.0:
+                continue
             to = np.uint64(n_children)
-            for axis in range(3):
-                origin[to, axis] = sent[kind + FROM + axis, lane]
-                direction[to, axis] = sent[kind + TOWARDS + axis, lane]
-                weight[to, axis] = sent[kind + SHARE + axis, lane]
-            pencil[to, 0], pencil[to, 1] = places.rows[WIDTH, lane], sent[kind + SPREAD, lane]
-            children.sample[to] = sample
+            origin.x[to], origin.y[to], origin.z[to] = _three(sent, kind + FROM, lane)
+            direction.x[to], direction.y[to], direction.z[to] = _three(sent, kind + TOWARDS, lane)
+            weight.x[to], weight.y[to], weight.z[to] = _three(sent, kind + SHARE, lane)
+            children.width[to], children.spread[to] = places.rows[WIDTH, lane], sent[kind + SPREAD, lane]
+            children.sample[to] = sample_of[first + lane]
             if nested:
                 children.around[to] = places.around[BEHIND if kind == REFRACTED else BEFORE, lane]
             counters[REFRACTIONS if kind == REFRACTED else REFLECTIONS] += 1
             n_children += 1
     return n_children
+
+
+@formula
+def _three(rows: NDArray[np.float64], row: int, lane: int) -> tuple[float, float, float]:
+    return rows[row, lane], rows[row + 1, lane], rows[row + 2, lane]

@@ -16,9 +16,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.gather import entry, held, keep, lane_numbers, pick
+from renderer.gather import entry, held, keep, lane_numbers
 from renderer.kernel import formula, roomy_kernel
 from renderer.lanes import LANES, anywhere, choose, least, most, root
+from renderer.rays import Vectors
 
 LEAF_SPHERES = 4
 """Most spheres in a leaf of the tree."""
@@ -155,11 +156,11 @@ class _Group(NamedTuple):
 
 
 @formula
-def _group_of(origin: NDArray[np.float32], direction: NDArray[np.float32], row: Any) -> _Group:
+def _group_of(origin: Vectors, direction: Vectors, row: Any) -> _Group:
     """The rays of some rows."""
-    dx, dy, dz = pick(direction, row, 0), pick(direction, row, 1), pick(direction, row, 2)
+    dx, dy, dz = entry(direction.x, row), entry(direction.y, row), entry(direction.z, row)
     return _Group(
-        pick(origin, row, 0), pick(origin, row, 1), pick(origin, row, 2), dx, dy, dz, 1.0 / dx, 1.0 / dy, 1.0 / dz
+        entry(origin.x, row), entry(origin.y, row), entry(origin.z, row), dx, dy, dz, 1.0 / dx, 1.0 / dy, 1.0 / dz
     )
 
 
@@ -232,8 +233,8 @@ def _within(tree: SphereTree, rays: _Group, sphere: int) -> Any:
 @roomy_kernel
 def nearest_spheres(
     tree: SphereTree,
-    origin: NDArray[np.float32],
-    direction: NDArray[np.float32],
+    origin: Vectors,
+    direction: Vectors,
     first_id: int,
     distance: NDArray[np.float32],
     primitive: NDArray[np.int32],
@@ -242,7 +243,7 @@ def nearest_spheres(
 
     Args:
         tree: the spheres.
-        origin, direction: (n, 3) float32 rays.
+        origin, direction: of n rays.
         first_id: number of sphere 0 as a primitive.
         distance: (n,) float32 distance of the nearest hit so far, in lengths of the direction.
         primitive: (n,) int32 what was hit, -1 for nothing.
@@ -277,8 +278,8 @@ def nearest_spheres(
 @roomy_kernel
 def shade_spheres(
     tree: SphereTree,
-    origin: NDArray[np.float32],
-    direction: NDArray[np.float32],
+    origin: Vectors,
+    direction: Vectors,
     reach: NDArray[np.float32],
     blocked: NDArray[np.uint8],
 ) -> None:
@@ -286,7 +287,7 @@ def shade_spheres(
 
     Args:
         tree: the spheres; only those that cast shadows count.
-        origin, direction: (n, 3) float32 rays.
+        origin, direction: of n rays.
         reach: (n,) float32 distance of the light, in lengths of the direction.
         blocked: (n,) uint8, set to 1 where a sphere stands before the light; rays already 1 are skipped.
     """

@@ -17,6 +17,7 @@ from renderer.gather import octet
 from renderer.kernel import formula
 from renderer.lanes import anywhere, arc_sine, arc_tangent, choose, least, most, root, size, whole
 from renderer.prepared import MATERIAL_COLUMN
+from renderer.rays import Vectors
 from renderer.sphere import SphereTree, hit_distance
 
 OFFSET_ULPS = 16.0 * 2.0**-23
@@ -168,15 +169,13 @@ def sphere_surface(
 
 
 @formula
-def sphere_met(
-    spheres: SphereTree, k: int, origin: NDArray[np.float32], direction: NDArray[np.float32], ray: int
-) -> Surface:
-    """The surface of sphere `k` where ray number `ray`, of (n, 3) float32 origins and directions, meets it."""
+def sphere_met(spheres: SphereTree, k: int, origin: Vectors, direction: Vectors, ray: int) -> Surface:
+    """The surface of sphere `k` where ray number `ray`, of n origins and directions, meets it."""
     center = spheres.center
     return sphere_surface(
         center[k, 0], center[k, 1], center[k, 2], spheres.radius[k], int(np.int64(spheres.material[k])),
-        np.float64(origin[ray, 0]), np.float64(origin[ray, 1]), np.float64(origin[ray, 2]),
-        np.float64(direction[ray, 0]), np.float64(direction[ray, 1]), np.float64(direction[ray, 2]), True,
+        np.float64(origin.x[ray]), np.float64(origin.y[ray]), np.float64(origin.z[ray]),
+        np.float64(direction.x[ray]), np.float64(direction.y[ray]), np.float64(direction.z[ray]), True,
     )  # fmt: skip
 
 
@@ -185,8 +184,8 @@ def surface_met(
     facets: NDArray[np.float32],
     spheres: SphereTree,
     primitive: int,
-    origin: NDArray[np.float32],
-    direction: NDArray[np.float32],
+    origin: Vectors,
+    direction: Vectors,
     ray: int,
 ) -> Surface:
     """The surface of a triangle, or else of a sphere, that a ray met.
@@ -194,21 +193,21 @@ def surface_met(
     Args:
         facets, spheres: of the scene; triangles are counted first.
         primitive: which of them.
-        origin, direction: (n, 3) float32 rays.
+        origin, direction: of n rays.
         ray: which of them.
     """
     k = primitive - len(facets)
     if k >= 0:
         return sphere_met(spheres, k, origin, direction, ray)
-    ox, oy, oz = np.float64(origin[ray, 0]), np.float64(origin[ray, 1]), np.float64(origin[ray, 2])
-    dx, dy, dz = np.float64(direction[ray, 0]), np.float64(direction[ray, 1]), np.float64(direction[ray, 2])
+    ox, oy, oz = np.float64(origin.x[ray]), np.float64(origin.y[ray]), np.float64(origin.z[ray])
+    dx, dy, dz = np.float64(direction.x[ray]), np.float64(direction.y[ray]), np.float64(direction.z[ray])
     b1, b2 = weights_at(facets, primitive, ox, oy, oz, dx, dy, dz)
     return triangle_surface(facets, primitive, b1, b2, dx, dy, dz)
 
 
 @formula
-def go_on_behind(s: Surface, origin: NDArray[np.float32], ray: int) -> None:
+def go_on_behind(s: Surface, origin: Vectors, ray: int) -> None:
     """Move the origin of a ray just behind a surface that it goes through unbent."""
-    origin[ray, 0] = s.px - s.offset * s.gx
-    origin[ray, 1] = s.py - s.offset * s.gy
-    origin[ray, 2] = s.pz - s.offset * s.gz
+    origin.x[ray] = s.px - s.offset * s.gx
+    origin.y[ray] = s.py - s.offset * s.gy
+    origin.z[ray] = s.pz - s.offset * s.gz

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.camera import ViewFrame
-from renderer.rays import make_rays
+from renderer.rays import make_rays, rows_of
 from renderer.sampling import camera_rays, lattice_order, lattice_step
 
 SCREEN_PX = 32_768
@@ -38,6 +38,6 @@ def places(
     since, until = np.full_like(chosen, first), np.full_like(chosen, first + samples)
     origin = np.zeros(3, np.float32)
     camera_rays(shifted, origin, *screen, x, y, side, chosen, since, until, points, step, order, rays)
-    direction = rays.direction.astype(np.float64).reshape(len(cells), samples, 3)
+    direction = rows_of(rays.direction).astype(np.float64).reshape(len(cells), samples, 3)
     corner = np.stack([x - x[0], y - y[0]], axis=1)[:, None]
     return direction[..., :2] / direction[..., 2:] - corner

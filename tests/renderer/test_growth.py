@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from renderer import whitted
 from renderer.acuity import Acuity
@@ -23,7 +22,7 @@ from renderer.intersection import Intersector
 from renderer.pipeline import Renderer
 from renderer.prepared import PreparedScene, prepare
 from renderer.quality import MAPS, Quality
-from renderer.rays import Hits
+from renderer.rays import Hits, Vectors
 from renderer.tracing import block_starts
 from tests.renderer.drawing import glass_and_mirror
 
@@ -132,7 +131,7 @@ class Held:
         self.reached = threading.Event()
         self.batches = 0
 
-    def nearest(self, origin: NDArray[np.float32], direction: NDArray[np.float32]) -> Hits:
+    def nearest(self, origin: Vectors, direction: Vectors) -> Hits:
         self.batches += 1
         if self.batches >= self._hold_at:
             self.reached.set()

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from renderer.rays import make_rays
+from renderer.rays import make_rays, rows_of
 from renderer.sampling import camera_rays, lattice_step
 from tests.renderer.cell_point import PIXEL_VIEW, SCREEN_PX, places
 
@@ -131,7 +131,8 @@ def test_cells_of_one_call_may_be_sampled_from_different_samples_on() -> None:
         PIXEL_VIEW, np.zeros(3, np.float32), SCREEN_PX, SCREEN_PX, x, y, side, cells,
         np.array([2, 7], np.int32), np.array([5, 9], np.int32), 9, 0, 1, rays,
     )  # fmt: skip
-    seen = rays.direction[:, :2] / rays.direction[:, 2:]
+    direction = rows_of(rays.direction)
+    seen = direction[:, :2] / direction[:, 2:]
     np.testing.assert_allclose(seen, places([(0, 0, 4)], 9)[0, [2, 3, 4, 7, 8]], rtol=1e-5)
     assert rays.sample.tolist() == [0, 1, 2, 3, 4]
 

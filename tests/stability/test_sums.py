@@ -21,7 +21,7 @@ from renderer.kernel import kernel
 from renderer.pipeline import Renderer
 from renderer.prepared import prepare
 from renderer.quality import MAPS, Quality
-from renderer.rays import make_rays
+from renderer.rays import make_rays, rows_of
 from renderer.sampling import camera_rays, lattice_order
 from renderer.scene import Mesh, Scene, Sphere
 from renderer.sphere import hit_distance
@@ -155,7 +155,7 @@ def test_h52_the_last_pixels_of_a_huge_screen(width: int, height: int) -> None:
         view, np.zeros(3, np.float32), width, height, x, y, side, chosen,
         first, first + 1, 1, 0, lattice_order(1), rays,
     )  # fmt: skip
-    direction = rays.direction.astype(np.float64)
+    direction = rows_of(rays.direction).astype(np.float64)
     along = view.corner + (x + 0.5)[:, None] * view.step_x + (y + 0.5)[:, None] * view.step_y
     apart = np.linalg.norm(direction * np.linalg.norm(along, axis=1, keepdims=True) - along, axis=1)
     assert (apart / np.linalg.norm(view.step_x) < 2.0**-10).all()

@@ -74,7 +74,7 @@ def _followed(job: Job, twin: Renderer, pool: WorkerPool, request: FrameRequest)
     intersector = job.prepared.intersector
     recorder = RecordingIntersector(intersector)
     twin.render(replace(job.prepared, intersector=recorder), request)  # type: ignore[arg-type]
-    packets_ms = _timed_ms(partial(trace_rays, recorder, pool, intersector.nearest, intersector.occluded))
+    packets_ms = _timed_ms(partial(trace_rays, recorder.rays, pool, intersector.nearest, intersector.occluded))
     cells, _ = job.renderer.cell_map(request.display, request.quality, request.gaze)
     map_ms = _copied_ms((cells.x, cells.y, cells.side, cells.mask), pool)
     picture_ms = _copied_ms((cells.mask, frame.pixels), pool)
