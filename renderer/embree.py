@@ -131,6 +131,25 @@ class EmbreeTriangles:
         """The same triangles as embreex traces them, ready: the fallback, and what benchmarks compare with."""
         return plain_scene(self._vertices, self._faces, robust=True)
 
+    def searches(self) -> tuple[Packet, Search, Search] | None:
+        """This thread's room for a packet, and what searches with it for the nearest triangle, and for any; None where
+        rays are traced singly.
+        """
+        return None if self._library is None else self._searches(self._library)
+
+    def _searches(self, library: Library) -> tuple[Packet, Search, Search]:
+        room, scene = _room_of(library), self._scene
+        return (
+            room.packet,
+            Search(library.intersect, scene, room.nearest_singly, room.nearest_together),
+            Search(library.occluded, scene, room.occluded_singly, room.occluded_together),
+        )
+
+    @property
+    def look_twice(self) -> bool:
+        """Whether rays that meet nothing are searched again: there are corners to slip through."""
+        return len(self._faces) >= FEWEST_AROUND
+
     def nearest(
         self,
         origin: Vectors | NDArray[np.float32],
@@ -148,19 +167,17 @@ class EmbreeTriangles:
             (n,) int32 and (n,) float32 in lengths of the direction; the distance of a miss is infinite.
         """
         origin, direction = columns(origin, direction)
-        again = len(self._faces) >= FEWEST_AROUND
         if self._library is None:
             begin, towards = rows_of(origin), rows_of(direction)
             primitive, distance = self._nearest_singly(begin, towards)
             missed = np.flatnonzero(primitive < 0)
-            if again and len(missed):
+            if self.look_twice and len(missed):
                 primitive[missed], distance[missed] = self._nearest_singly(begin[missed], turned(towards[missed]))
             return primitive, distance
         primitive = np.empty(len(origin.x), dtype=np.int32)
         distance = np.empty(len(origin.x), dtype=np.float32)
-        room = _room_of(self._library)
-        search = Search(self._library.intersect, self._scene, room.nearest_singly, room.nearest_together)
-        trace_nearest(search, coherent, again, room.packet, origin, direction, primitive, distance)
+        packet, search, _ = self._searches(self._library)
+        trace_nearest(search, coherent, self.look_twice, packet, origin, direction, primitive, distance)
         return primitive, distance
 
     def _nearest_singly(
@@ -191,10 +208,8 @@ class EmbreeTriangles:
             answers = self.yardstick.run(rows_of(origin), rows_of(direction), reach, "OCCLUDED")
             np.equal(answers, 0, out=blocked.view(np.bool_))
             return
-        room = _room_of(self._library)
-        together = room.occluded_together if coherent else room.occluded_singly
-        search = Search(self._library.occluded, self._scene, room.occluded_singly, together)
-        trace_occluded(search, room.packet, origin, direction, reach, blocked)
+        packet, _, search = self._searches(self._library)
+        trace_occluded(search, coherent, packet, origin, direction, reach, blocked)
 
 
 def plain_scene(vertices: NDArray[np.float32], faces: NDArray[np.int32], *, robust: bool) -> EmbreeScene:

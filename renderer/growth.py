@@ -14,8 +14,8 @@ from renderer.frame import RayCounts, RejectedSamples
 from renderer.prepared import PreparedScene
 from renderer.quality import Quality
 from renderer.store import FIRST_ROUND, SampleStore, missing_cells
-from renderer.tracing import Lack, Tracing, samples_between, total_rays
-from renderer.whitted import View
+from renderer.tracing import Lack, Tracing, total_rays
+from renderer.whitted import View, samples_between
 from renderer.workers import Workers
 
 

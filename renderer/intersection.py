@@ -3,14 +3,66 @@
 from __future__ import annotations
 
 import copy
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from renderer.area_light import nearest_area_lights
 from renderer.embree import EmbreeTriangles
+from renderer.kernel import kernel
+from renderer.packets import Packet, Search, trace_nearest, trace_occluded
 from renderer.rays import Hits, Vectors, columns
-from renderer.sphere import SphereTree, nearest_spheres, shade_spheres
+from renderer.sphere import SphereTree, Stack, make_stack, nearest_spheres, shade_spheres
+
+
+class Solids(NamedTuple):
+    """What rays meet, as compiled code asks it.
+
+    Attributes:
+        packet: the thread's room for rays.
+        nearest, occluded: searches of the triangles that are seen, and of those that cast shadows.
+        look_twice: whether rays that meet no triangle are searched again.
+        triangles_cast, spheres_cast: whether any of them casts shadows.
+        spheres, stack: the spheres, and the thread's room for a search of them.
+        lights: (l,) AREA_LIGHT.
+        triangles: how many are seen.
+    """
+
+    packet: Packet
+    nearest: Search
+    occluded: Search
+    look_twice: bool
+    triangles_cast: bool
+    spheres_cast: bool
+    spheres: SphereTree
+    stack: Stack
+    lights: NDArray[np.void]
+    triangles: int
+
+
+@kernel
+def find_nearest(solids: Solids, origin: Vectors, direction: Vectors, hits: Hits) -> None:
+    """Write the nearest hit of each ray."""
+    primitive, distance = hits.primitive, hits.distance
+    trace_nearest(solids.nearest, True, solids.look_twice, solids.packet, origin, direction, primitive, distance)
+    if len(solids.spheres.radius) > 0:
+        nearest_spheres(solids.spheres, solids.stack, origin, direction, solids.triangles, distance, primitive)
+    if len(solids.lights) > 0:
+        first = solids.triangles + len(solids.spheres.radius)
+        nearest_area_lights(solids.lights, origin, direction, first, distance, primitive)
+
+
+@kernel
+def find_blocked(
+    solids: Solids, origin: Vectors, direction: Vectors, reach: NDArray[np.float32], blocked: NDArray[np.uint8]
+) -> None:
+    """Write 1 for each shadow ray that something which casts shadows blocks, else 0."""
+    blocked[:] = 0
+    if solids.triangles_cast:
+        trace_occluded(solids.occluded, True, solids.packet, origin, direction, reach, blocked)
+    if solids.spheres_cast:
+        shade_spheres(solids.spheres, solids.stack, origin, direction, reach, blocked)
 
 
 class Intersector:
@@ -58,6 +110,19 @@ class Intersector:
         other._area_lights = self._area_lights[:0]
         return other
 
+    def solids(self) -> Solids | None:
+        """What rays meet, for this thread's compiled code; None where there are no triangles, or no packets."""
+        searches = None if self._seen is None else self._seen.searches()
+        if self._seen is None or searches is None:
+            return None
+        packet, nearest, occluded = searches
+        if self._casting is not None:
+            _, _, occluded = self._casting.searches() or searches
+        return Solids(
+            packet, nearest, occluded, self._seen.look_twice, self._casting is not None, self._sphere_casts,
+            self._spheres, make_stack(), self._area_lights, self.triangles,
+        )  # fmt: skip
+
     def nearest(self, origin: Vectors | NDArray[np.float32], direction: Vectors | NDArray[np.float32]) -> Hits:
         """Nearest hit of each ray.
 
@@ -71,7 +136,9 @@ class Intersector:
         else:
             hits = Hits(*self._seen.nearest(origin, direction))
         if len(self._spheres.radius):
-            nearest_spheres(self._spheres, origin, direction, self.triangles, hits.distance, hits.primitive)
+            nearest_spheres(
+                self._spheres, make_stack(), origin, direction, self.triangles, hits.distance, hits.primitive
+            )  # fmt: skip
         if len(self._area_lights):
             first = self.triangles + len(self._spheres.radius)
             nearest_area_lights(self._area_lights, origin, direction, first, hits.distance, hits.primitive)
@@ -97,7 +164,7 @@ class Intersector:
         if self._casting is not None:
             self._casting.occluded(origin, direction, limit, blocked)
         if self._sphere_casts:
-            shade_spheres(self._spheres, origin, direction, reach, blocked)
+            shade_spheres(self._spheres, make_stack(), origin, direction, reach, blocked)
         return blocked
 
     def bare_nearest(self, origin: NDArray[np.float32], direction: NDArray[np.float32]) -> None:

@@ -9,14 +9,15 @@ from __future__ import annotations
 import os
 import shutil
 import tempfile
+import zlib
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import Any, NamedTuple, TypeVar, cast
 
 import numba
 from llvmlite import ir
-from numba.core import types
-from numba.extending import intrinsic
+from numba.core import cgutils, types
+from numba.extending import intrinsic, register_jitable
 
 from renderer.version import PACKAGE, source_hash
 
@@ -87,6 +88,11 @@ def roomy_kernel(function: _F) -> _F:
     return cast(_F, numba.njit(**_OPTIONS)(function))
 
 
+def shared(function: _F) -> _F:
+    """A function that stays plain Python where Python calls it, and is compiled into kernels that call it."""
+    return register_jitable(function)
+
+
 def _prefetch(_context: Any, rows: Any, row: Any) -> Any:
     """Ask for the two cache lines at the start of rows[row], a C-contiguous 2-D array, without waiting."""
 
@@ -124,6 +130,54 @@ def _call(_context: Any, _function: Any, _a: Any, _b: Any, _c: Any, _d: Any) -> 
 
 
 call: Any = intrinsic(_call)
+
+
+class Entry(NamedTuple):
+    """Where a kernel is compiled.
+
+    Attributes:
+        address: of its code.
+        kinds: stands for the types of its arguments.
+    """
+
+    address: int
+    kinds: int
+
+
+def entry_of(function: Any, *arguments: Any) -> Entry:
+    """Where `function`, a kernel that returns nothing, is compiled for arguments of these types; it takes a while."""
+    kinds = tuple(numba.typeof(argument) for argument in arguments)
+    function.compile(kinds)
+    compiled = function.overloads[kinds]
+    address = compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name)
+    return Entry(address, zlib.crc32(repr(kinds).encode()))
+
+
+def _through(_context: Any, entry: Any, arguments: Any) -> Any:
+    """Call the kernel at an entry with a tuple of arguments.
+
+    A kernel that another calls by its name is compiled once more within that one; through its entry it is not.
+    """
+    kinds = tuple(arguments)
+
+    def generate(target: Any, builder: Any, _signature: Any, values: Any) -> Any:
+        address, found = cgutils.unpack_tuple(builder, values[0], 2)
+        convention = target.call_conv
+        expected = found.type(zlib.crc32(repr(kinds).encode()))
+        with cgutils.if_unlikely(builder, builder.icmp_unsigned("!=", found, expected)):
+            convention.return_user_exc(builder, TypeError, ("a kernel was compiled for other types of arguments",))
+        kind = convention.get_function_type(types.none, kinds)
+        callee = builder.inttoptr(address, kind.as_pointer())
+        unpacked = cgutils.unpack_tuple(builder, values[1], len(kinds))
+        status, _ = convention.call_function(builder, callee, types.none, kinds, unpacked)
+        with cgutils.if_unlikely(builder, status.is_error):
+            convention.return_status_propagate(builder, status)
+        return target.get_dummy_value()
+
+    return types.void(entry, arguments), generate
+
+
+through: Any = intrinsic(_through)
 
 
 def _at(_context: Any, _address: Any, sample: Any) -> Any:

@@ -331,6 +331,7 @@ def _search_again(
 @kernel
 def trace_occluded(
     search: Search,
+    coherent: bool,
     packet: Packet,
     origin: Vectors,
     direction: Vectors,
@@ -341,7 +342,8 @@ def trace_occluded(
     width, valid, rows = packet.width, packet.valid, packet.rows
     for first in range(0, len(blocked), width):
         count = min(width, len(blocked) - first)
-        query = search.singly if _load_packet(packet, origin, direction, first, count) else search.together
+        parallel = _load_packet(packet, origin, direction, first, count)
+        query = search.together if coherent and not parallel else search.singly
         for lane in range(count):
             rows[FAR * width + lane] = reach[first + lane]
         call(search.function, valid.ctypes.data, search.scene, rows.ctypes.data, query.ctypes.data)

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.kernel import shared
 from renderer.lanes import LANES
 
 PAGE, STAGGER = 4096, 320
@@ -106,10 +107,9 @@ def rows_of(vectors: Vectors) -> NDArray[np.float32]:
     return np.stack(vectors, axis=1)
 
 
-def some_vectors(vectors: Vectors, chosen: slice | NDArray[np.integer]) -> Vectors:
-    """Those that are chosen; of a slice without a copy."""
-    x, y, z = vectors
-    return Vectors(x[chosen], y[chosen], z[chosen])
+def some_vectors(vectors: Vectors, chosen: NDArray[np.integer]) -> Vectors:
+    """Those that are chosen, copied."""
+    return Vectors(vectors.x[chosen], vectors.y[chosen], vectors.z[chosen])
 
 
 def copied(vectors: Vectors) -> Vectors:
@@ -117,29 +117,35 @@ def copied(vectors: Vectors) -> Vectors:
     return Vectors(vectors.x.copy(), vectors.y.copy(), vectors.z.copy())
 
 
+@shared
+def span(vectors: Vectors, start: int, stop: int) -> Vectors:
+    """Vectors start .. stop - 1, without a copy."""
+    return Vectors(vectors.x[start:stop], vectors.y[start:stop], vectors.z[start:stop])
+
+
+@shared
 def some_rays(rays: Rays, start: int, stop: int) -> Rays:
     """Rays start .. stop - 1, without a copy."""
-    part = slice(start, stop)
     return Rays(
-        some_vectors(rays.origin, part),
-        some_vectors(rays.direction, part),
-        some_vectors(rays.weight, part),
-        rays.sample[part],
-        rays.width[part],
-        rays.spread[part],
-        rays.around[part],
+        span(rays.origin, start, stop),
+        span(rays.direction, start, stop),
+        span(rays.weight, start, stop),
+        rays.sample[start:stop],
+        rays.width[start:stop],
+        rays.spread[start:stop],
+        rays.around[start:stop],
     )
 
 
+@shared
 def first_shadow_rays(rays: ShadowRays, count: int) -> ShadowRays:
     """The first `count` shadow rays, without a copy."""
-    part = slice(count)
     return ShadowRays(
-        some_vectors(rays.origin, part),
-        some_vectors(rays.direction, part),
-        rays.reach[part],
-        some_vectors(rays.light, part),
-        rays.sample[part],
+        span(rays.origin, 0, count),
+        span(rays.direction, 0, count),
+        rays.reach[:count],
+        span(rays.light, 0, count),
+        rays.sample[:count],
     )
 
 

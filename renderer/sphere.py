@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.gather import entry, held, keep, lane_numbers
-from renderer.kernel import formula, roomy_kernel
+from renderer.kernel import formula, kernel
 from renderer.lanes import LANES, anywhere, choose, least, most, root
 from renderer.rays import Vectors
 
@@ -56,6 +56,25 @@ class SphereTree(NamedTuple):
     box: NDArray[np.float64]
     first: NDArray[np.int32]
     length: NDArray[np.int32]
+
+
+class Stack(NamedTuple):
+    """Room for a search.
+
+    Attributes:
+        nodes: (STACK_SIZE,) int32 that are still to be looked at.
+        entries: (STACK_SIZE, LANES) float64 where each ray enters them.
+        met: (2, LANES) float64, rows NEAREST and FOUND.
+    """
+
+    nodes: NDArray[np.int32]
+    entries: NDArray[np.float64]
+    met: NDArray[np.float64]
+
+
+def make_stack() -> Stack:
+    """Room for a search at a time."""
+    return Stack(np.zeros(STACK_SIZE, dtype=np.int32), np.zeros((STACK_SIZE, LANES)), np.zeros((2, LANES)))
 
 
 def build_sphere_tree(
@@ -230,9 +249,10 @@ def _within(tree: SphereTree, rays: _Group, sphere: int) -> Any:
     return hit_distance(rays.ox, rays.oy, rays.oz, rays.dx, rays.dy, rays.dz, cx, cy, cz, tree.radius[sphere])
 
 
-@roomy_kernel
+@kernel
 def nearest_spheres(
     tree: SphereTree,
+    stack: Stack,
     origin: Vectors,
     direction: Vectors,
     first_id: int,
@@ -243,14 +263,14 @@ def nearest_spheres(
 
     Args:
         tree: the spheres.
+        stack: room.
         origin, direction: of n rays.
         first_id: number of sphere 0 as a primitive.
         distance: (n,) float32 distance of the nearest hit so far, in lengths of the direction.
         primitive: (n,) int32 what was hit, -1 for nothing.
     """
     firsts, lengths, n = tree.first, tree.length, len(distance) if len(tree.radius) > 0 else 0
-    nodes, entries = np.zeros(STACK_SIZE, dtype=np.int32), np.zeros((STACK_SIZE, LANES))
-    met = np.zeros((2, LANES))
+    nodes, entries, met = stack
     for first in range(0, n, LANES):
         row = least(lane_numbers(first), n - 1)
         rays = _group_of(origin, direction, row)
@@ -275,9 +295,10 @@ def nearest_spheres(
                     distance[ray], primitive[ray] = met[NEAREST, ray - first], first_id + int(met[FOUND, ray - first])
 
 
-@roomy_kernel
+@kernel
 def shade_spheres(
     tree: SphereTree,
+    stack: Stack,
     origin: Vectors,
     direction: Vectors,
     reach: NDArray[np.float32],
@@ -287,13 +308,13 @@ def shade_spheres(
 
     Args:
         tree: the spheres; only those that cast shadows count.
+        stack: room.
         origin, direction: of n rays.
         reach: (n,) float32 distance of the light, in lengths of the direction.
         blocked: (n,) uint8, set to 1 where a sphere stands before the light; rays already 1 are skipped.
     """
     firsts, lengths, casts, n = tree.first, tree.length, tree.casts, len(reach) if len(tree.radius) > 0 else 0
-    nodes, entries = np.zeros(STACK_SIZE, dtype=np.int32), np.zeros((STACK_SIZE, LANES))
-    met = np.zeros((1, LANES))
+    nodes, entries, met = stack
     for first in range(0, n, LANES):
         row = least(lane_numbers(first), n - 1)
         rays = _group_of(origin, direction, row)

@@ -13,8 +13,14 @@ from renderer.kernel import kernel
 from renderer.prepared import PreparedScene
 from renderer.quality import Quality
 from renderer.store import SampleStore, add_samples
-from renderer.whitted import Cells, View, block_rays, trace_cells
+from renderer.whitted import Cells, View, block_rays, samples_between, trace_cells
 from renderer.workers import Workers
+
+SHARES = 4
+"""Parts, for each thread, of the samples that are left, of which a block gets one at most."""
+
+SMALLEST_BLOCK = 4096
+"""Samples that a block may always have: in smaller ones what goes before and after them is felt."""
 
 
 class Lack(NamedTuple):
@@ -76,7 +82,7 @@ class ThreadTracing:
         """Trace block after block of the samples, each added to the store by the thread that traced it."""
         prepared, view, quality, squares, chosen, first, until = lack
         samples, spread, white = store.samples, store.spread, store.white
-        starts = block_starts(first, until, block_rays(prepared, quality))
+        starts = block_starts(first, until, block_rays(prepared, quality), SHARES * pool.threads)
         counts = [RayCounts()] * (len(starts) - 1)
         rejected = np.zeros((len(starts) - 1, 3), dtype=np.int64)
 
@@ -90,40 +96,35 @@ class ThreadTracing:
         return Traced(total_rays(counts), rejected.sum(axis=0))
 
 
-def block_starts(first: NDArray[np.int32], until: NDArray[np.int32], block: int) -> list[int]:
+def block_starts(first: NDArray[np.int32], until: NDArray[np.int32], block: int, shares: int = 1) -> list[int]:
     """Where to cut a row of cells into blocks of at most `block` samples, or of a single cell of more.
 
     Args:
         first, until: (c,) int32 samples first .. until - 1 of each cell, 1 or more.
         block: most samples of a block.
+        shares: a block gets no more than one part in `shares` of what is left, so that threads that take them one after
+            another end together; but SMALLEST_BLOCK it may always have.
 
     Returns:
         the first cell of each block, and c.
     """
     starts = np.empty(len(first) + 1, dtype=np.int64)
-    return [*starts[: _cut(first, until, block, starts)].tolist(), len(first)]
+    return [*starts[: _cut(first, until, block, shares, starts)].tolist(), len(first)]
 
 
 @kernel
-def _cut(first: NDArray[np.int32], until: NDArray[np.int32], block: int, starts: NDArray[np.int64]) -> int:
+def _cut(first: NDArray[np.int32], until: NDArray[np.int32], block: int, shares: int, starts: NDArray[np.int64]) -> int:
     """Write the first cell of each block; how many these are."""
-    blocks, held = 0, block
+    left = samples_between(first, until)
+    blocks, held, most = 0, block, 0
     for cell in range(len(first)):
         samples = until[cell] - first[cell]
-        if held + samples > block:
+        if held + samples > most:
             starts[blocks] = cell
-            blocks, held = blocks + 1, 0
+            blocks, held, most = blocks + 1, 0, min(block, max(SMALLEST_BLOCK, left // shares))
         held += samples
+        left -= samples
     return blocks
-
-
-@kernel
-def samples_between(first: NDArray[np.int32], until: NDArray[np.int32]) -> int:
-    """How many samples first .. until - 1 of each cell are, both (c,) int32."""
-    samples = 0
-    for cell in range(len(first)):
-        samples += until[cell] - first[cell]
-    return samples
 
 
 def total_rays(counts: list[RayCounts]) -> RayCounts:

@@ -12,23 +12,29 @@ from renderer.camera import Camera, ViewFrame, view_frame
 from renderer.cutout import cast_through, pass_holes
 from renderer.display import Display
 from renderer.frame import RayCounts
+from renderer.intersection import Intersector, Solids, find_blocked, find_nearest
+from renderer.kernel import Entry, entry_of, kernel, through
+from renderer.levels import Levels, make_levels, next_batch, wait_for_children
 from renderer.light_samples import LightSamples, seed_samples
 from renderer.nested import media_at, pass_hidden
-from renderer.places import make_places
-from renderer.prepared import PreparedScene
+from renderer.prepared import PreparedScene, Surfaces
 from renderer.quality import Quality
-from renderer.rays import Rays, first_shadow_rays, make_rays, make_shadow_rays, some_rays
+from renderer.rays import Hits, first_shadow_rays, some_rays
 from renderer.sampling import camera_rays, lattice_order, lattice_step
 from renderer.shading import shade
 from renderer.shadow_rays import add_unblocked
-from renderer.spawning import CHILDREN, COUNTERS, REFLECTIONS, REFRACTIONS, SHADOWS
+from renderer.spawning import REFLECTIONS, REFRACTIONS, SHADOWS
 from renderer.tonemap import SMALLEST_STEP
 
-BLOCK_RAYS = 8192
-"""Rays traced together: what they carry stays in a core's second-level cache."""
+BLOCK_RAYS = 32_768
+"""Rays traced together: enough of them that it does not matter what it takes to have Embree's tree, then the scene's
+surfaces, then the tree once more in a core's second-level cache."""
 
-MAX_BLOCK_SHADOW_RAYS = 65_536
+MAX_BLOCK_SHADOW_RAYS = 131_072
 """Bound on the shadow rays of a block; a scene of many lights gets smaller blocks."""
+
+KNOWN_SCENES = 64
+"""Scenes of which it is remembered where their shading is compiled."""
 
 
 class View(NamedTuple):
@@ -65,27 +71,26 @@ class Cells(NamedTuple):
     until: NDArray[np.int32]
 
 
-class _Scratch:
-    """Room for the rays of a block, level by level; one per thread, kept between blocks."""
+class Limits(NamedTuple):
+    """How far a block of camera samples is followed.
 
-    def __init__(self, capacity: int, shadow_rays: int, lights: int) -> None:
-        self.capacity = capacity
-        self.shadow_rays = shadow_rays
-        self.lights = lights
-        self.places = make_places(lights)
-        self.levels = [make_rays(2 * capacity)]
-        self.shadows = make_shadow_rays(shadow_rays)
-        self.counters = np.zeros(COUNTERS, dtype=np.int64)
-        self.seed = np.zeros(capacity, dtype=np.uint64)
-        self.number = np.zeros(capacity, dtype=np.int32)
+    Attributes:
+        samples: how many there are.
+        block: most rays of a batch.
+        max_depth: how often a ray is sent on.
+        shadow_rays_each: shadow rays of a camera sample to each area light.
+        cutoff: smallest weight worth a ray.
+    """
 
-    def level(self, depth: int) -> Rays:
-        while len(self.levels) <= depth:
-            self.levels.append(make_rays(2 * self.capacity))
-        return self.levels[depth]
+    samples: int
+    block: int
+    max_depth: int
+    shadow_rays_each: int
+    cutoff: float
 
 
 _local = threading.local()
+_entries: dict[object, Entry] = {}
 
 
 def view_of(prepared: PreparedScene, camera: Camera, display: Display) -> View:
@@ -115,6 +120,15 @@ def _most_shadow_rays(prepared: PreparedScene, quality: Quality) -> int:
     return len(surfaces.lights) + len(surfaces.area_lights) * shadow_rays_each(quality)
 
 
+@kernel
+def samples_between(first: NDArray[np.int32], until: NDArray[np.int32]) -> int:
+    """How many samples first .. until - 1 of each cell are, both (c,) int32."""
+    samples = 0
+    for cell in range(len(first)):
+        samples += until[cell] - first[cell]
+    return samples
+
+
 def trace_cells(
     prepared: PreparedScene, view: View, cells: Cells, quality: Quality
 ) -> tuple[NDArray[np.float32], RayCounts]:
@@ -130,112 +144,151 @@ def trace_cells(
     Returns:
         (samples, 3) float32 radiance, the samples of a cell after one another, and the rays traced.
     """
-    n = int((cells.until - cells.first).sum())
-    block = block_rays(prepared, quality)
-    lights = len(prepared.surfaces.lights)
-    scratch = _scratch(max(block, n), block * _most_shadow_rays(prepared, quality), lights)
+    cutoff = SMALLEST_STEP / (prepared.scene.exposure * max(1.0, prepared.brightest))
+    n = samples_between(cells.first, cells.until)
+    limits = Limits(n, block_rays(prepared, quality), quality.max_depth, shadow_rays_each(quality), cutoff)
+    levels = _levels_for(prepared, limits, quality)
     points = quality.samples_per_cell
     step = lattice_step(points) if quality.antialiasing == "regular" else 0
     camera_rays(
         view.frame, view.origin, view.width, view.height, cells.x, cells.y, cells.side, cells.chosen,
-        cells.first, cells.until, points, step, lattice_order(points), scratch.level(0),
+        cells.first, cells.until, points, step, lattice_order(points), levels.rays,
     )  # fmt: skip
     if _has_media(prepared):
-        scratch.level(0).around[:n] = view.around
+        levels.rays.around[:n] = view.around
     if len(prepared.surfaces.area_lights):
-        seed_samples(cells.x, cells.y, cells.side, cells.chosen, cells.first, cells.until, scratch.seed, scratch.number)
+        seed_samples(
+            cells.x, cells.y, cells.side, cells.chosen, cells.first, cells.until, levels.seed, levels.number
+        )  # fmt: skip
     radiance = np.zeros((n, 3), dtype=np.float32)
-    counts = _follow(prepared, scratch, n, block, quality, radiance)
-    return radiance, counts
+    levels.pending[0] = 0, n
+    solids = _plain_solids(prepared)
+    if solids is None:
+        rays = _follow_past_holes(prepared, levels, limits, radiance)
+    else:
+        rays = _follow(
+            _shading(prepared, levels, limits, radiance), solids, prepared.surfaces, levels, limits, radiance
+        )
+    return radiance, RayCounts(n, *rays)
 
 
-def _scratch(capacity: int, shadow_rays: int, lights: int) -> _Scratch:
-    """This thread's scratch, with room for `capacity` rays a level, `shadow_rays`, `lights`; it never shrinks."""
-    held: _Scratch | None = getattr(_local, "scratch", None)
-    if held is None:
-        held = _Scratch(capacity, shadow_rays, lights)
-    elif held.capacity < capacity or held.shadow_rays < shadow_rays or held.lights < lights:
-        held = _Scratch(max(capacity, held.capacity), max(shadow_rays, held.shadow_rays), max(lights, held.lights))
-    _local.scratch = held
-    return held
+def _levels_for(prepared: PreparedScene, limits: Limits, quality: Quality) -> Levels:
+    """This thread's levels, with room for a block; it never shrinks."""
+    shadow_rays = limits.block * _most_shadow_rays(prepared, quality)
+    wanted = max(limits.block, limits.samples), limits.max_depth + 2, shadow_rays, len(prepared.surfaces.lights)
+    sizes: tuple[int, ...] = getattr(_local, "sizes", (0, 0, 0, 0))
+    if any(more > held for more, held in zip(wanted, sizes, strict=True)):
+        _local.sizes = tuple(map(max, wanted, sizes))
+        _local.levels = make_levels(*_local.sizes)
+    levels: Levels = _local.levels
+    return levels
 
 
+def _plain_solids(prepared: PreparedScene) -> Solids | None:
+    """What rays meet where each ends at the first thing in its way, so that kernels need nobody but Embree."""
+    if _has_media(prepared) or "cutouts" in prepared.plan.names or prepared.sieve is not None:
+        return None
+    return prepared.intersector.solids() if isinstance(prepared.intersector, Intersector) else None
+
+
+@kernel
 def _follow(
-    prepared: PreparedScene, scratch: _Scratch, n: int, block: int, quality: Quality, radiance: NDArray[np.float32]
-) -> RayCounts:
-    """Trace `n` camera rays of level 0 and all that they spawn, the deepest pending level first.
-
-    A level holds the children of one batch of at most `block` rays, so memory is bounded by depth.
-    Batches end between samples wherever a sample's rays fit in one: what a sample adds up to, and in
-    which order, does not depend on its neighbours in the block.
-    """
-    cutoff = SMALLEST_STEP / (prepared.scene.exposure * max(1.0, prepared.brightest))
-    pending = [[0, n]]
-    shadow_rays = reflections = refractions = 0
-    while pending:
-        depth = len(pending) - 1
-        start, end = pending[depth]
-        if start == end:
-            pending.pop()
-            continue
-        rays = scratch.level(depth)
-        stop = batch_end(rays.sample, start, end, block)
-        pending[depth][0] = stop
-        batch = some_rays(rays, start, stop)
-        draws = LightSamples(scratch.seed, scratch.number, shadow_rays_each(quality), depth)
-        spawned = _shade_batch(prepared, scratch, batch, draws, depth < quality.max_depth, cutoff, radiance)
-        shadow_rays += int(spawned[SHADOWS])
-        reflections += int(spawned[REFLECTIONS])
-        refractions += int(spawned[REFRACTIONS])
-        if spawned[CHILDREN]:
-            pending.append([0, int(spawned[CHILDREN])])
-    return RayCounts(n, shadow_rays, reflections, refractions)
-
-
-def batch_end(sample: NDArray[np.int32], start: int, end: int, block: int) -> int:
-    """Where the batch that begins at `start` ends: after at most `block` rays, between two samples.
-
-    A single sample of more than `block` rays is cut after `block` of them.
+    entry: Entry, solids: Solids, surfaces: Surfaces, levels: Levels, limits: Limits, radiance: NDArray[np.float32]
+) -> tuple[int, int, int]:
+    """Trace the camera rays that wait and all that they spawn, the deepest level first.
 
     Args:
-        sample: rising sample numbers of the rays.
-        start, end: rays start .. end - 1 are pending.
-        block: most rays of a batch.
+        entry: of `shade`.
+        solids: what rays meet.
+        surfaces: what shading reads.
+        levels: the rays.
+        limits: how far they are followed.
+        radiance: (samples, 3) float32, added to.
+
+    Returns:
+        Shadow rays, reflected and refracted rays.
     """
-    if end - start <= block:
-        return end
-    limit = start + block
-    boundary = start + int(np.searchsorted(sample[start:end], sample[limit]))
-    return boundary if boundary > start else limit
+    rays, shadows, counters = levels.rays, levels.shadows, levels.counters
+    asked = reflections = refractions = 0
+    depth, start, stop = next_batch(levels, 0, limits.block)
+    while depth >= 0:
+        batch, n = some_rays(rays, start, stop), stop - start
+        hits = Hits(levels.hits.primitive[:n], levels.hits.distance[:n])
+        find_nearest(solids, batch.origin, batch.direction, hits)
+        children = some_rays(rays, (depth + 1) * levels.capacity, (depth + 2) * levels.capacity)
+        draws = LightSamples(levels.seed, levels.number, limits.shadow_rays_each, depth)
+        spawn = depth < limits.max_depth
+        through(
+            entry,
+            (surfaces, batch, hits, spawn, limits.cutoff, draws, levels.places, children, shadows, radiance, counters),
+        )
+        if counters[SHADOWS] > 0:
+            some, blocked = first_shadow_rays(shadows, counters[SHADOWS]), levels.blocked[: counters[SHADOWS]]
+            find_blocked(solids, some.origin, some.direction, some.reach, blocked)
+            add_unblocked(some, blocked, radiance)
+        asked += counters[SHADOWS]
+        reflections += counters[REFLECTIONS]
+        refractions += counters[REFRACTIONS]
+        depth, start, stop = next_batch(levels, wait_for_children(levels, depth), limits.block)
+    return asked, reflections, refractions
 
 
-def _shade_batch(
+def _shading(prepared: PreparedScene, levels: Levels, limits: Limits, radiance: NDArray[np.float32]) -> Entry:
+    """Where `shade` is compiled for a scene."""
+    key = shade, prepared.identity
+    if key not in _entries:
+        if len(_entries) >= KNOWN_SCENES:
+            _entries.clear()
+        draws = LightSamples(levels.seed, levels.number, limits.shadow_rays_each, 0)
+        _entries[key] = entry_of(
+            shade, prepared.surfaces, levels.rays, levels.hits, True, limits.cutoff, draws, levels.places, levels.rays,
+            levels.shadows, radiance, levels.counters,
+        )  # fmt: skip
+    return _entries[key]
+
+
+def _follow_past_holes(
+    prepared: PreparedScene, levels: Levels, limits: Limits, radiance: NDArray[np.float32]
+) -> tuple[int, int, int]:
+    """`_follow` batch by batch: where rays go on behind holes or hidden boundaries, or embreex is asked."""
+    asked = reflections = refractions = 0
+    depth, start, stop = next_batch(levels, 0, limits.block)
+    while depth >= 0:
+        _trace_batch(prepared, levels, limits, depth, start, stop, radiance)
+        asked += int(levels.counters[SHADOWS])
+        reflections += int(levels.counters[REFLECTIONS])
+        refractions += int(levels.counters[REFRACTIONS])
+        depth, start, stop = next_batch(levels, wait_for_children(levels, depth), limits.block)
+    return asked, reflections, refractions
+
+
+def _trace_batch(
     prepared: PreparedScene,
-    scratch: _Scratch,
-    batch: Rays,
-    draws: LightSamples,
-    spawn: bool,
-    cutoff: float,
+    levels: Levels,
+    limits: Limits,
+    depth: int,
+    start: int,
+    stop: int,
     radiance: NDArray[np.float32],
-) -> NDArray[np.int64]:
-    """Trace one batch of rays, add what they see, and leave their children on the next level."""
+) -> None:
+    """Trace rays start .. stop - 1 of a level, add what they see, and leave their children on the next one."""
+    batch = some_rays(levels.rays, start, stop)
     hits = prepared.intersector.nearest(batch.origin, batch.direction)
     if "cutouts" in prepared.plan.names:
         pass_holes(prepared.surfaces, prepared.intersector, batch.origin, batch.direction, hits)
     if _has_media(prepared):
         pass_hidden(prepared, batch.origin, batch.direction, batch.around, hits)
-    counters = scratch.counters
-    children = scratch.level(draws.depth + 1)
+    children = some_rays(levels.rays, (depth + 1) * levels.capacity, (depth + 2) * levels.capacity)
+    draws = LightSamples(levels.seed, levels.number, limits.shadow_rays_each, depth)
     shade(
-        prepared.surfaces, batch, hits, spawn, cutoff, draws, scratch.places, children, scratch.shadows, radiance,
-        counters,
+        prepared.surfaces, batch, hits, depth < limits.max_depth, limits.cutoff, draws, levels.places, children,
+        levels.shadows, radiance, levels.counters,
     )  # fmt: skip
-    pending = int(counters[SHADOWS])
-    if pending:
-        shadows = first_shadow_rays(scratch.shadows, pending)
+    asked = int(levels.counters[SHADOWS])
+    if asked:
+        shadows = first_shadow_rays(levels.shadows, asked)
         reach = None if prepared.sieve is None else shadows.reach.copy()
         blocked = prepared.intersector.occluded(shadows.origin, shadows.direction, shadows.reach)
         if prepared.sieve is not None and reach is not None:
             cast_through(prepared.sieve, shadows, reach, blocked)
         add_unblocked(shadows, blocked, radiance)
-    return counters

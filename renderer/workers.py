@@ -22,6 +22,10 @@ class Workers(Protocol):
     """Whoever runs the blocks of a job."""
 
     @property
+    def threads(self) -> int:
+        """How many blocks it runs at once."""
+
+    @property
     def abandon(self) -> threading.Event | None:
         """Once it is set, what was begun is given up; None for never."""
 
@@ -168,6 +172,7 @@ class _WorkersUntil:
 
     def __init__(self, pool: WorkerPool, abandon: threading.Event) -> None:
         self._pool = pool
+        self.threads = pool.threads
         self.abandon = abandon
 
     def run(self, task: Callable[[int], None], count: int) -> None:

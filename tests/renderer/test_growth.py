@@ -23,7 +23,7 @@ from renderer.pipeline import Renderer
 from renderer.prepared import PreparedScene, prepare
 from renderer.quality import MAPS, Quality
 from renderer.rays import Hits, Vectors
-from renderer.tracing import block_starts
+from renderer.tracing import SMALLEST_BLOCK, block_starts
 from tests.renderer.drawing import glass_and_mirror
 
 SCREEN = Display(64, 36, width_cm=6.0)
@@ -204,3 +204,14 @@ def test_blocks_are_as_large_as_they_may_be(samples: list[int], block: int) -> N
         size = sum(samples[start:end])
         assert size <= block or end == start + 1
         assert end == len(samples) or size + samples[end] > block
+
+
+@given(st.lists(st.integers(1, 3000), min_size=1, max_size=60), st.integers(1, 8))
+def test_blocks_become_smaller_as_little_is_left(samples: list[int], shares: int) -> None:
+    first = np.arange(len(samples), dtype=np.int32)
+    starts = block_starts(first, first + np.array(samples, np.int32), 32_768, shares)
+    assert (starts[0], starts[-1]) == (0, len(samples))
+    for start, end in itertools.pairwise(starts):
+        size, most = sum(samples[start:end]), max(SMALLEST_BLOCK, sum(samples[start:]) // shares)
+        assert size <= most or end == start + 1
+        assert end == len(samples) or size + samples[end] > most

@@ -11,7 +11,19 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from renderer.gather import OCTET, entry, held, keep, lane_numbers, octet, pick
+from renderer.gather import (
+    OCTET,
+    add_marked,
+    along,
+    entry,
+    held,
+    keep,
+    lane_numbers,
+    octet,
+    pick,
+    put,
+    put_marked,
+)
 from renderer.kernel import kernel
 from renderer.lanes import (
     LANES,
@@ -22,6 +34,7 @@ from renderer.lanes import (
     choose,
     exponential,
     floor,
+    how_many,
     least,
     logarithm_beside_one,
     most,
@@ -33,6 +46,7 @@ from renderer.lanes import (
     whole,
 )
 from renderer.prepared import FACET
+from renderer.rays import make_columns
 from renderer.surface import triangle_surface, weights_at
 
 ROWS = 32
@@ -138,6 +152,53 @@ def test_numbers_come_from_their_places(dtype: type) -> None:
     np.testing.assert_array_equal(out[0], records["number"][places])
     np.testing.assert_array_equal(out[1], table[places, 3])
     np.testing.assert_array_equal(out[2 : 2 + OCTET], table[places, 2 : 2 + OCTET].T)
+
+
+@kernel
+def copied_in_lanes(column: Any, whole_column: Any, first: int, last: int, marks: Any, floats: Any, ints: Any) -> int:
+    """Lanes from `first` on to the front of the first rows; the marked ones of them to the front of the others."""
+    chosen, values = along(marks, 0, LANES - 1) != 0, along(column, first, last)
+    numbers = along(whole_column, first, last)
+    put(floats[0], 0, values)
+    put(ints[0], 0, numbers)
+    put_marked(floats[1], 0, chosen, values)
+    put_marked(ints[1], 0, chosen, numbers)
+    return how_many(chosen)
+
+
+@given(st.integers(0, 70), st.lists(st.booleans(), min_size=LANES, max_size=LANES))
+def test_columns_are_read_and_written_side_by_side(first: int, marked: list[bool]) -> None:
+    """Beyond the last number that one again, whatever lies behind it; of the marked lanes no gap is left."""
+    draw = np.random.default_rng(first)
+    (column,), (numbers,), (marks,) = (make_columns(1, 71, kind) for kind in (np.float32, np.int32, np.int32))
+    column[:], numbers[:], marks[:LANES] = draw.normal(size=71), draw.integers(-9, 9, 71), marked
+    floats, ints = np.full((2, 2 * LANES), -7, np.float32), np.full((2, 2 * LANES), -7, np.int32)
+    last = min(70, first + 20)
+    assert copied_in_lanes(column, numbers, first, last, marks, floats, ints) == sum(marked)
+    rows = np.minimum(first + np.arange(LANES), last)
+    for found, source in ((floats, column), (ints, numbers)):
+        np.testing.assert_array_equal(found[0, :LANES], source[rows])
+        np.testing.assert_array_equal(found[1, : sum(marked)], source[rows][marked])
+        assert (found[0, LANES:] == -7).all()
+        assert (found[1, sum(marked) :] == -7).all()
+
+
+@kernel
+def added_in_lanes(table: Any, marks: Any, places: Any) -> None:
+    lane = lane_numbers(0)
+    add_marked(table, entry(marks, lane) != 0, entry(places, lane), lane + 0.1, lane * 2, 1.0)
+
+
+@given(st.lists(st.booleans(), min_size=LANES, max_size=LANES), st.lists(st.integers(0, 5), min_size=16, max_size=16))
+def test_marked_lanes_are_added_one_after_another(marked: list[bool], places: list[int]) -> None:
+    """To the same row, too."""
+    table = np.full((6, 3), 0.3, np.float32)
+    truth = table.copy()
+    added_in_lanes(table, np.array(marked, np.int32), np.array(places, np.int32))
+    for lane, (mark, place) in enumerate(zip(marked, places, strict=True)):
+        if mark:
+            truth[place] += np.array([lane + 0.1, lane * 2, 1.0]).astype(np.float32)
+    np.testing.assert_array_equal(table, truth)
 
 
 @kernel

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from renderer.rays import columns
-from renderer.sphere import SphereTree, build_sphere_tree, hit_distance, nearest_spheres, shade_spheres
+from renderer.sphere import SphereTree, build_sphere_tree, hit_distance, make_stack, nearest_spheres, shade_spheres
 
 Floats = NDArray[np.float64]
 
@@ -27,7 +27,7 @@ def nearest(tree: SphereTree, origin: Floats, direction: Floats) -> tuple[NDArra
     n = len(origin)
     distance, primitive = np.full(n, np.inf, np.float32), np.full(n, -1, np.int32)
     rays = columns(origin.astype(np.float32), direction.astype(np.float32))
-    nearest_spheres(tree, *rays, 0, distance, primitive)
+    nearest_spheres(tree, make_stack(), *rays, 0, distance, primitive)
     found = primitive >= 0
     primitive[found] = tree.material[primitive[found]]
     return distance, primitive
@@ -96,7 +96,7 @@ def test_shadows_of_spheres_are_what_trying_every_sphere_finds(seed: int, count:
     blocked = np.zeros(16, np.uint8)
     blocked[3] = 1
     tree = tree_of(center, radius, casts)
-    shade_spheres(tree, *columns(origin.astype(np.float32), direction.astype(np.float32)), reach, blocked)
+    shade_spheres(tree, make_stack(), *columns(origin.astype(np.float32), direction.astype(np.float32)), reach, blocked)
     truth = (every < reach[:, None]).any(axis=1)
     truth[3] = True
     np.testing.assert_array_equal(blocked, truth)
@@ -106,7 +106,7 @@ def test_a_hit_nearer_than_every_sphere_stays() -> None:
     tree = tree_of(np.zeros((1, 3)), np.ones(1))
     distance, primitive = np.array([1.5, 2.5], np.float32), np.array([7, 7], np.int32)
     origin, direction = np.float32([[0, 0, 3]] * 2), np.float32([[0, 0, -1]] * 2)
-    nearest_spheres(tree, *columns(origin, direction), 100, distance, primitive)
+    nearest_spheres(tree, make_stack(), *columns(origin, direction), 100, distance, primitive)
     assert primitive.tolist() == [7, 100]
     assert distance.tolist() == [1.5, 2.0]
 

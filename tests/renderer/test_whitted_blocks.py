@@ -9,9 +9,9 @@ import pytest
 
 from renderer import whitted
 from renderer.camera import Camera
+from renderer.levels import batch_end
 from renderer.pipeline import Renderer
 from renderer.scene import Scene, Sphere, Surroundings
-from renderer.whitted import batch_end
 from tests.renderer.drawing import WHITE_LAMBERT, floor, glass, light, shoot
 
 

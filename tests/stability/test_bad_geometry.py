@@ -174,12 +174,11 @@ def test_h10_rays_of_a_wrong_shape_are_refused(origin: NDArray[np.float32], dire
 @pytest.mark.parametrize("singly", [False, True])
 def test_h10_rays_may_lie_in_memory_as_they_like(singly: bool) -> None:
     rng = np.random.default_rng(8)
-    made = EmbreeTriangles(
-        rng.uniform(-1, 1, (300, 3)).astype(np.float32), np.arange(300, dtype=np.int32).reshape(-1, 3), singly=singly
-    )
+    vertices, faces = rng.uniform(-1, 1, (300, 3)).astype(np.float32), np.arange(300, dtype=np.int32).reshape(-1, 3)
+    made = EmbreeTriangles(vertices, faces, singly=singly)
     origin, direction = (rng.uniform(-1, 1, (100, 3)).astype(np.float32) for _ in range(2))
     found, distance = made.nearest(origin, direction)
-    assert (found >= 0).any() and (found < 0).any()
+    assert 0 < (found >= 0).sum() < 100
     for order in (np.asfortranarray, lambda rows: np.repeat(rows, 2, axis=0)[::2], vectors_of):
         again, length = made.nearest(order(origin), order(direction))
         np.testing.assert_array_equal(again, found)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from renderer import whitted
+from renderer import levels, whitted
 from renderer.camera import Camera
 from renderer.errors import SettingsError
 from renderer.pipeline import Renderer
@@ -103,7 +103,7 @@ def test_h40_rays_in_flight_are_bounded_by_depth_not_by_the_tree(monkeypatch: py
         return make_rays(capacity)
 
     monkeypatch.setattr(whitted, "BLOCK_RAYS", 64)
-    monkeypatch.setattr(whitted, "make_rays", counted)
+    monkeypatch.setattr(levels, "make_rays", counted)
     balls = tuple(Sphere((0, 0, 0), 1.0 - i / 8, glass(1.5 if i % 2 == 0 else 1 / 1.5)) for i in range(6))
     scene = Scene(spheres=balls, surroundings=EVERYWHERE_1, exposure=1e12, camera=VIEW)
     fresh = Renderer(threads=1)

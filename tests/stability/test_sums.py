@@ -27,7 +27,8 @@ from renderer.scene import Mesh, Scene, Sphere
 from renderer.sphere import hit_distance
 from renderer.surface import weights_at
 from renderer.texture import wrap
-from renderer.tracing import block_starts, samples_between, total_rays
+from renderer.tracing import block_starts, total_rays
+from renderer.whitted import samples_between
 from tests.renderer.cell_point import places
 from tests.renderer.drawing import (
     EVERYWHERE_1,
