@@ -101,6 +101,18 @@ def apart(shape: int | tuple[int, ...], dtype: DTypeLike, zeroed: bool = False) 
     return array
 
 
+def sparse(length: int, dtype: DTypeLike) -> NDArray[Any]:
+    """(length,) zeros that take memory only where they are written, page by page.
+
+    Raises:
+        MemoryError: if there are no pages.
+    """
+    size = max(1, length * np.dtype(dtype).itemsize)
+    if not hasattr(mmap, "MAP_ANONYMOUS"):
+        return np.zeros(length, dtype)
+    return np.frombuffer(_map(size), dtype, length)
+
+
 _spare: deque[mmap.mmap] = deque(maxlen=SPARES)
 _most_spare_bytes = SPARE_BYTES
 
@@ -129,11 +141,15 @@ def _drop_spare_pages() -> None:
             _spare.popleft()
 
 
-def _new_pages(size: int) -> mmap.mmap:
+def _map(size: int) -> mmap.mmap:
     try:
-        pages = mmap.mmap(-1, size, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
+        return mmap.mmap(-1, size, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
     except OSError as error:
         raise MemoryError(f"no {size:,} bytes of memory") from error
+
+
+def _new_pages(size: int) -> mmap.mmap:
+    pages = _map(size)
     if size >= HUGE_BYTES and hasattr(mmap, "MADV_HUGEPAGE"):
         with contextlib.suppress(OSError):  # a kernel without them
             pages.madvise(mmap.MADV_HUGEPAGE)

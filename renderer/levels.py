@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from renderer.kernel import shared
 from renderer.places import Places, make_places
-from renderer.rays import Hits, Rays, ShadowRays, make_rays, make_shadow_rays
+from renderer.rays import Hits, Rays, ShadowRays, level_rows, make_rays, make_shadow_rays, some_rays
 from renderer.spawning import CHILDREN, COUNTERS
 
 
@@ -20,8 +20,8 @@ class Levels(NamedTuple):
     """Room for the rays of a block, and for what becomes of a batch of them.
 
     Attributes:
-        rays: level after level, `capacity` each.
-        capacity: most rays of a level.
+        rays: those of each level `apart` rows after those of the level before, `capacity` of them at most.
+        capacity, apart: see there.
         pending: (levels, 2) int64 those that wait: the first, and that after the last.
         hits: what the rays of a batch meet.
         shadows: their shadow rays.
@@ -33,6 +33,7 @@ class Levels(NamedTuple):
 
     rays: Rays
     capacity: int
+    apart: int
     pending: NDArray[np.int64]
     hits: Hits
     shadows: ShadowRays
@@ -44,7 +45,7 @@ class Levels(NamedTuple):
 
 
 def make_levels(samples: int, levels: int, shadow_rays: int, lights: int) -> Levels:
-    """Room for a block.
+    """Room for a block; of most of it no page is touched before rays are written there.
 
     Args:
         samples: most camera samples, and most rays of a batch.
@@ -54,16 +55,17 @@ def make_levels(samples: int, levels: int, shadow_rays: int, lights: int) -> Lev
     """
     capacity = 2 * samples
     return Levels(
-        rays=make_rays(levels * capacity),
+        rays=make_rays(capacity, levels),
         capacity=capacity,
+        apart=level_rows(capacity),
         pending=np.zeros((levels, 2), dtype=np.int64),
-        hits=Hits(np.zeros(samples, dtype=np.int32), np.zeros(samples, dtype=np.float32)),
+        hits=Hits(np.empty(samples, dtype=np.int32), np.empty(samples, dtype=np.float32)),
         shadows=make_shadow_rays(shadow_rays),
-        blocked=np.zeros(shadow_rays, dtype=np.uint8),
+        blocked=np.empty(shadow_rays, dtype=np.uint8),
         places=make_places(lights),
         counters=np.zeros(COUNTERS, dtype=np.int64),
-        seed=np.zeros(samples, dtype=np.uint64),
-        number=np.zeros(samples, dtype=np.int32),
+        seed=np.empty(samples, dtype=np.uint64),
+        number=np.empty(samples, dtype=np.int32),
     )
 
 
@@ -109,11 +111,18 @@ def batch_end(sample: NDArray[np.int32], start: int, end: int, block: int) -> in
 
 
 @shared
+def room_for_children(levels: Levels, depth: int) -> Rays:
+    """The next level, for the children of a batch of level `depth`."""
+    first = (depth + 1) * levels.apart
+    return some_rays(levels.rays, first, first + levels.capacity)
+
+
+@shared
 def wait_for_children(levels: Levels, depth: int) -> int:
     """Let the children of the batch of level `depth` wait on the next one; the deepest level that rays wait on now."""
     spawned = levels.counters[CHILDREN]
     if spawned == 0:
         return depth
-    first = (depth + 1) * levels.capacity
+    first = (depth + 1) * levels.apart
     levels.pending[depth + 1, 0], levels.pending[depth + 1, 1] = first, first + spawned
     return depth + 1

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.allocator import sparse
 from renderer.kernel import shared
 from renderer.lanes import LANES
 
@@ -149,28 +150,43 @@ def first_shadow_rays(rays: ShadowRays, count: int) -> ShadowRays:
     )
 
 
-def make_columns(count: int, capacity: int, kind: Any = np.float32) -> list[NDArray[Any]]:
+def make_columns(count: int, capacity: int, kind: Any = np.float32, levels: int = 1) -> list[NDArray[Any]]:
     """`count` columns of (capacity,) zeros, with memory behind each that LANES numbers at once may run into.
 
     They lie STAGGER bytes apart but for whole pages: what stands in the same row of several would otherwise contend for
-    the same few places in a core's first cache.
+    the same few places in a core's first cache. Of more levels than one, each has its `capacity` rows, `level_rows`
+    after those of the level before; between them are the other columns, so that what is written together lies together.
     """
     size = np.dtype(kind).itemsize
     apart = -(-(capacity + LANES) * size // PAGE) * PAGE + STAGGER
-    room = np.zeros(count * apart // size, dtype=kind)
-    return [room[start : start + capacity] for start in range(0, len(room), apart // size)]
+    room = sparse(levels * count * apart // size, kind)
+    return [
+        room[column * apart // size :][: (levels - 1) * count * apart // size + capacity] for column in range(count)
+    ]
 
 
-def make_rays(capacity: int) -> Rays:
-    """Room for `capacity` rays."""
-    columns = make_columns(11, capacity)
-    (sample,), (around,) = make_columns(1, capacity, np.int32), make_columns(1, capacity, np.int64)
+RAY_COLUMNS = 12
+"""Columns of rays that are 4 bytes wide: all but one, that of the media."""
+
+
+def level_rows(capacity: int) -> int:
+    """Rows from the first of one level of rays to that of the next, where each has `capacity` of them."""
+    return RAY_COLUMNS * (-(-(capacity + LANES) * 4 // PAGE) * PAGE + STAGGER) // 4
+
+
+def make_rays(capacity: int, levels: int = 1) -> Rays:
+    """Room for `capacity` rays, or for so many in each of some levels."""
+    columns = make_columns(RAY_COLUMNS, capacity, levels=levels)
+    around = sparse((levels - 1) * level_rows(capacity) + capacity + LANES, np.int64)
     return Rays(
-        Vectors(*columns[:3]), Vectors(*columns[3:6]), Vectors(*columns[6:9]), sample, columns[9], columns[10], around
-    )
+        Vectors(*columns[:3]), Vectors(*columns[3:6]), Vectors(*columns[6:9]), columns[9].view(np.int32),
+        columns[10], columns[11], around,
+    )  # fmt: skip
 
 
 def make_shadow_rays(capacity: int) -> ShadowRays:
     """Room for `capacity` shadow rays."""
-    columns, (sample,) = make_columns(10, capacity), make_columns(1, capacity, np.int32)
-    return ShadowRays(Vectors(*columns[:3]), Vectors(*columns[3:6]), columns[6], Vectors(*columns[7:]), sample)
+    columns = make_columns(11, capacity)
+    return ShadowRays(
+        Vectors(*columns[:3]), Vectors(*columns[3:6]), columns[6], Vectors(*columns[7:10]), columns[10].view(np.int32)
+    )

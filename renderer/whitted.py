@@ -14,7 +14,7 @@ from renderer.display import Display
 from renderer.frame import RayCounts
 from renderer.intersection import Intersector, Solids, find_blocked, find_nearest
 from renderer.kernel import Entry, entry_of, kernel, through
-from renderer.levels import Levels, make_levels, next_batch, wait_for_children
+from renderer.levels import Levels, make_levels, next_batch, room_for_children, wait_for_children
 from renderer.light_samples import LightSamples, seed_samples
 from renderer.nested import media_at, pass_hidden
 from renderer.prepared import PreparedScene, Surfaces
@@ -215,7 +215,7 @@ def _follow(
         batch, n = some_rays(rays, start, stop), stop - start
         hits = Hits(levels.hits.primitive[:n], levels.hits.distance[:n])
         find_nearest(solids, batch.origin, batch.direction, hits)
-        children = some_rays(rays, (depth + 1) * levels.capacity, (depth + 2) * levels.capacity)
+        children = room_for_children(levels, depth)
         draws = LightSamples(levels.seed, levels.number, limits.shadow_rays_each, depth)
         spawn = depth < limits.max_depth
         through(
@@ -278,7 +278,7 @@ def _trace_batch(
         pass_holes(prepared.surfaces, prepared.intersector, batch.origin, batch.direction, hits)
     if _has_media(prepared):
         pass_hidden(prepared, batch.origin, batch.direction, batch.around, hits)
-    children = some_rays(levels.rays, (depth + 1) * levels.capacity, (depth + 2) * levels.capacity)
+    children = room_for_children(levels, depth)
     draws = LightSamples(levels.seed, levels.number, limits.shadow_rays_each, depth)
     shade(
         prepared.surfaces, batch, hits, depth < limits.max_depth, limits.cutoff, draws, levels.places, children,

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from renderer import allocator
-from renderer.allocator import APART_BYTES, SPARE_BYTES, apart, keep_spare_pages
+from renderer.allocator import APART_BYTES, SPARE_BYTES, apart, keep_spare_pages, sparse
 
 BLOCKS, BLOCK_BYTES = 6, 8 << 20
 
@@ -162,3 +162,20 @@ def test_few_pages_wait_for_a_next_array(most_bytes: int) -> None:
     arrays.clear()
     assert most_bytes - 5 * MIB < resident_bytes() - before < most_bytes + 8 * MIB
     keep_spare_pages(SPARE_BYTES)
+
+
+def test_sparse_zeros_take_memory_only_where_they_are_written() -> None:
+    """A page or two of a gibibyte; the process itself reads how many of its pages are in memory."""
+    statm = Path("/proc/self/statm")
+    if not statm.exists():
+        pytest.skip("needs /proc, as Linux has it")
+
+    def resident() -> int:
+        return int(statm.read_text().split()[1]) * mmap.PAGESIZE
+
+    before = resident()
+    zeros = sparse(2**27, np.float64)
+    zeros[[0, 2**26, -1]] = 1.0
+    assert zeros[1] == zeros[2**26 + 1] == 0.0
+    assert resident() - before < 2**24
+    assert sparse(0, np.int64).shape == (0,)

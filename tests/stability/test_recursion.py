@@ -98,9 +98,9 @@ def test_h40_rays_in_flight_are_bounded_by_depth_not_by_the_tree(monkeypatch: py
     """Six glass balls in each other at depth 14 spawn more than 20,000 rays; levels hold two blocks of 64 each."""
     room = []
 
-    def counted(capacity: int) -> Rays:
-        room.append(capacity)
-        return make_rays(capacity)
+    def counted(capacity: int, levels: int) -> Rays:
+        room.append(capacity * levels)
+        return make_rays(capacity, levels)
 
     monkeypatch.setattr(whitted, "BLOCK_RAYS", 64)
     monkeypatch.setattr(levels, "make_rays", counted)
@@ -110,8 +110,7 @@ def test_h40_rays_in_flight_are_bounded_by_depth_not_by_the_tree(monkeypatch: py
     frame = shoot(fresh, scene, 2, 2, depth=14)
     fresh.close()
     assert frame.cost.rays.total > 20_000
-    assert len(room) <= 14 + 2
-    assert sum(room) <= (14 + 2) * 2 * 64
+    assert room == [(14 + 2) * 2 * 64]
 
 
 def flake(level: int, center: tuple[float, float, float] = (0, 0, 0), radius: float = 1.0) -> list[Sphere]:
