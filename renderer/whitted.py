@@ -26,11 +26,11 @@ from renderer.shadow_rays import add_unblocked
 from renderer.spawning import REFLECTIONS, REFRACTIONS, SHADOWS
 from renderer.tonemap import SMALLEST_STEP
 
-BLOCK_RAYS = 32_768
+BLOCK_RAYS = 16_384
 """Rays traced together: enough of them that it does not matter what it takes to have Embree's tree, then the scene's
 surfaces, then the tree once more in a core's second-level cache."""
 
-MAX_BLOCK_SHADOW_RAYS = 131_072
+MAX_BLOCK_SHADOW_RAYS = 65_536
 """Bound on the shadow rays of a block; a scene of many lights gets smaller blocks."""
 
 KNOWN_SCENES = 64
