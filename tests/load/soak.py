@@ -41,7 +41,7 @@ class Held:
     """What the service holds at a moment.
 
     Attributes:
-        seconds: since the stream began.
+        seconds: since the stream's first frame.
         frames: rendered by then.
         memory_bytes: resident.
         kept_bytes: of that, what the service says that it keeps.
@@ -118,10 +118,10 @@ async def soak(
         scene: its id.
         size_px: of the screen.
         trace: in pixels of that screen, or in fractions.
-        seconds: how long.
+        seconds: how long, from the first frame on.
         tell: receives a line a minute.
     """
-    found, rendered = Soak(), 0
+    found = Soak()
     every_s = min(seconds / (4 * BLOCKS), LOOK_S)
     asking = httpx.AsyncClient(base_url=service.address, timeout=PATIENCE_S, trust_env=False)
     async with asking as client, Display(service.address) as display:
@@ -132,8 +132,9 @@ async def soak(
             format="jpeg",
         )
         looking = asyncio.create_task(_look(display, trace))
-        began, looked, told = time.monotonic(), 0.0, 0.0
         try:
+            rendered = (await display.next_frame(decode=False)).header.frame
+            began, looked, told = time.monotonic(), 0.0, 0.0
             while looked < seconds:
                 with contextlib.suppress(TimeoutError):
                     async with asyncio.timeout(every_s):
