@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from renderer.cellmap import CellMap
 from renderer.gather import entry, keep, lane_numbers, pick
 from renderer.kernel import kernel
-from renderer.lanes import LANES, least, single
+from renderer.lanes import LANES, anywhere, least, single
 from renderer.store import Samples
 from renderer.tonemap import FIRST_CODES, THRESHOLDS, srgb_code
 from renderer.workers import Workers
@@ -19,6 +19,9 @@ STRIP_ROWS = 64
 STRIP_CELLS = 2048 * LANES
 """Cells averaged together."""
 
+KNOWN = 1 << 24
+"""Marks a colour that a cell has: red | green << 8 | blue << 16 is not 0 even where it is black."""
+
 
 def reconstruct(
     cell_map: CellMap, slots: NDArray[np.int64], samples: Samples, exposure: float, linear: bool, pool: Workers
@@ -28,8 +31,8 @@ def reconstruct(
     Args:
         cell_map: the cells.
         slots: (n,) int64 slot of each cell in `samples`.
-        samples: sums and counts, every cell with at least one sample.
-        exposure: factor from radiance to 0..1; not applied to a linear frame.
+        samples: sums and counts, every cell with at least one sample; the colours of cells that have none are added.
+        exposure: factor from radiance to 0..1, always the same with these samples; not applied to a linear frame.
         linear: float32 radiance in place of 8-bit sRGB.
         pool: threads.
 
@@ -54,17 +57,17 @@ def reconstruct(
         pool.run(average, chunks)
         pool.run(spread, strips)
         return radiance
-    codes = np.empty((-(-cell_map.cells // LANES), LANES), dtype=np.int32)
+    colours = np.empty((-(-cell_map.cells // LANES), LANES), dtype=np.int32)
     picture = np.empty((height, width, 3), dtype=np.uint8)
 
     def expose(chunk: int) -> None:
         part = slice(chunk * STRIP_CELLS, (chunk + 1) * STRIP_CELLS)
         rows = slice(part.start // LANES, part.stop // LANES)
-        _mean_codes(samples, slots[part], np.float32(exposure), THRESHOLDS, FIRST_CODES, codes[rows])
+        _colours(samples, slots[part], np.float32(exposure), THRESHOLDS, FIRST_CODES, colours[rows])
 
     def paint(strip: int) -> None:
         part = slice(strip * STRIP_ROWS, (strip + 1) * STRIP_ROWS)
-        _gather_codes(cell_map.mask[part], codes.ravel(), picture[part])
+        _gather_colours(cell_map.mask[part], colours.ravel(), picture[part])
 
     pool.run(expose, chunks)
     pool.run(paint, strips)
@@ -90,23 +93,33 @@ def mean_radiance(samples: Samples, slots: NDArray[np.int64], exposure: np.float
 
 
 @kernel
-def _mean_codes(
+def _colours(
     samples: Samples,
     slots: NDArray[np.int64],
     exposure: np.float32,
     thresholds: NDArray[np.float32],
     first_codes: NDArray[np.int32],
-    codes: NDArray[np.int32],
+    colours: NDArray[np.int32],
 ) -> None:
-    """Exposed mean of each cell as red | green << 8 | blue << 16, LANES of them in a row of `codes`."""
-    total, count = samples.total, samples.number
-    for row in range(len(codes)):
-        slot = entry(slots, least(lane_numbers(row * LANES), len(slots) - 1))
+    """Exposed mean of each cell as KNOWN | red | green << 8 | blue << 16, LANES of them in a row of `colours`.
+
+    After a move of the gaze most cells have theirs from the frame before.
+    """
+    total, count, held = samples.total, samples.number, samples.colour
+    for row in range(len(colours)):
+        first = row * LANES
+        slot = entry(slots, least(lane_numbers(first), len(slots) - 1))
+        colour = entry(held, slot)
+        if not anywhere(colour == 0):
+            keep(colours, row, colour)
+            continue
         share = single(np.float64(exposure) * single(1.0 / entry(count, slot)))
         red = srgb_code(single(pick(total, slot, 0) * share), thresholds, first_codes)
         green = srgb_code(single(pick(total, slot, 1) * share), thresholds, first_codes)
         blue = srgb_code(single(pick(total, slot, 2) * share), thresholds, first_codes)
-        keep(codes, row, red + (green + blue * 256) * 256)
+        keep(colours, row, red + (green + blue * 256) * 256 + KNOWN)
+        for lane in range(min(LANES, len(slots) - first)):
+            held[slots[first + lane]] = colours[row, lane]
 
 
 @kernel
@@ -118,10 +131,10 @@ def _gather_radiance(mask: NDArray[np.int32], means: NDArray[np.float32], radian
 
 
 @kernel
-def _gather_codes(mask: NDArray[np.int32], codes: NDArray[np.int32], picture: NDArray[np.uint8]) -> None:
+def _gather_colours(mask: NDArray[np.int32], colours: NDArray[np.int32], picture: NDArray[np.uint8]) -> None:
     for row in range(mask.shape[0]):
         for column in range(mask.shape[1]):
-            code = codes[mask[row, column]]
-            picture[row, column, 0] = code & 0xFF
-            picture[row, column, 1] = (code >> 8) & 0xFF
-            picture[row, column, 2] = code >> 16
+            colour = colours[mask[row, column]]
+            picture[row, column, 0] = colour & 0xFF
+            picture[row, column, 1] = (colour >> 8) & 0xFF
+            picture[row, column, 2] = (colour >> 16) & 0xFF

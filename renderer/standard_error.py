@@ -26,8 +26,10 @@ from renderer.acuity import Acuity
 from renderer.cellmap import CellMap
 from renderer.display import Display
 from renderer.eccentricity import EyeGeometry, eye_geometry
+from renderer.gather import entry, keep, lane_numbers
 from renderer.gaze import Gaze, GazeBucket
 from renderer.kernel import formula, kernel
+from renderer.lanes import LANES, anywhere, choose, least, most
 from renderer.store import Samples
 from renderer.workers import Workers
 
@@ -94,7 +96,7 @@ def stated_error(
     eye = eye_geometry(display, Acuity(), GazeBucket(gaze.x, gaze.y, 0))
     chunks = -(-cell_map.cells // CHUNK_CELLS)
     every = 1 + cell_map.cells // GUESSED_CELLS
-    sums = np.zeros((chunks, 5))
+    sums = np.zeros((chunks, 5, LANES))
 
     def add(chunk: int) -> None:
         first = chunk * CHUNK_CELLS
@@ -104,7 +106,7 @@ def stated_error(
         _sum_guesses(eye, *cells, cell_map.mask, slots, samples, every, first, last, sums[chunk])
 
     pool.run(add, chunks)
-    screen, area, fovea, foveal_area, guessed = (float(total) for total in sums.sum(axis=0))
+    screen, area, fovea, foveal_area, guessed = (float(total) for total in sums.sum(axis=(0, 2)))
     return StatedError(
         exposure * math.sqrt(screen / area),
         exposure * math.sqrt(fovea / foveal_area) if foveal_area else None,
@@ -145,14 +147,18 @@ def _fovea_of(eye: EyeGeometry) -> _Fovea:
 
 
 @formula
+def _may_be_foveal(fovea: _Fovea, column: float, row: float) -> bool:
+    """Whether a place of the screen [px] is in the rectangle around the fovea. Numbers or lanes."""
+    return (column >= fovea.left) & (column <= fovea.right) & (row >= fovea.top) & (row <= fovea.bottom)
+
+
+@formula
 def _is_foveal(eye: EyeGeometry, fovea: _Fovea, column: float, row: float) -> bool:
-    """Whether a place of the screen [px] is within FOVEA_DEG of the gaze."""
-    if column < fovea.left or column > fovea.right or row < fovea.top or row > fovea.bottom:
-        return False
+    """Whether a place of the screen [px] that may be is within FOVEA_DEG of the gaze. Numbers or lanes."""
     x, y = (column - eye.width_px / 2) * eye.pitch_x, (row - eye.height_px / 2) * eye.pitch_y
     distance2 = eye.distance * eye.distance
     along = x * eye.gaze_x + y * eye.gaze_y + distance2
-    return along > 0.0 and along * along >= fovea.limit * (x * x + y * y + distance2)
+    return (along > 0.0) & (along * along >= fovea.limit * (x * x + y * y + distance2))
 
 
 @formula
@@ -184,27 +190,37 @@ def _sum_errors(
     sums: NDArray[np.float64],
 ) -> None:
     """Squared error times area and area of cells `first` to `last` - 1, those of cells in the fovea, and the area of
-    cells with one sample, whose error is left out, into `sums`, (5,).
+    cells with one sample, whose error is left out, into `sums`, (5, LANES), each of every LANES-th cell.
     """
     shown, square, count = samples.shown, samples.square, samples.number
     fovea = _fovea_of(eye)
-    screen = screen_area = foveal = foveal_area = guessed_area = 0.0
-    for cell in range(first, last):
-        slot, side = slots[cell], sides[cell]
-        number = count[slot]
-        area = float(side) * float(side)
-        error = 0.0
-        if number > 1:
-            mean = np.float64(shown[slot]) / number
-            error = area * max(0.0, np.float64(square[slot]) / number - mean * mean) / (number - 1)
-        else:
-            guessed_area += area
-        screen += error
-        screen_area += area
-        if _is_foveal(eye, fovea, x[cell] + 0.5 * side, y[cell] + 0.5 * side):
-            foveal += error
-            foveal_area += area
-    sums[0], sums[1], sums[2], sums[3], sums[4] = screen, screen_area, foveal, foveal_area, guessed_area
+    nothing = 0.0 * lane_numbers(first)
+    screen, screen_area, foveal, foveal_area, guessed_area = nothing, nothing, nothing, nothing, nothing
+    for start in range(first, last, LANES):
+        cell = least(lane_numbers(start), last - 1)
+        slot, side = entry(slots, cell), entry(sides, cell)
+        number = entry(count, slot)
+        area = choose(lane_numbers(start) < last, 1.0 * side * side, 0.0)
+        several = number > 1
+        error = nothing
+        if anywhere(several):
+            mean = entry(shown, slot) / number
+            variance = most(0.0, entry(square, slot) / number - mean * mean) / (number - 1.0)
+            error = choose(several, area * variance, 0.0)
+        screen = screen + error
+        screen_area = screen_area + area
+        guessed_area = guessed_area + choose(several, 0.0, area)
+        column, row = entry(x, cell) + 0.5 * side, entry(y, cell) + 0.5 * side
+        near = _may_be_foveal(fovea, column, row)
+        if anywhere(near):
+            near = near & _is_foveal(eye, fovea, column, row)
+            foveal = foveal + choose(near, error, 0.0)
+            foveal_area = foveal_area + choose(near, area, 0.0)
+    keep(sums, 0, screen)
+    keep(sums, 1, screen_area)
+    keep(sums, 2, foveal)
+    keep(sums, 3, foveal_area)
+    keep(sums, 4, guessed_area)
 
 
 @kernel
@@ -229,6 +245,7 @@ def _sum_guesses(
             continue
         around = _difference_around(x[cell], y[cell], side, np.float64(samples.shown[slot]), mask, slots, samples)
         error = every * NEIGHBOURS_SHARE * around * float(side) * float(side)
-        sums[0] += error
-        if _is_foveal(eye, fovea, x[cell] + 0.5 * side, y[cell] + 0.5 * side):
-            sums[2] += error
+        sums[0, 0] += error
+        column, row = x[cell] + 0.5 * side, y[cell] + 0.5 * side
+        if _may_be_foveal(fovea, column, row) and _is_foveal(eye, fovea, column, row):
+            sums[2, 0] += error

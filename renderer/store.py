@@ -46,12 +46,14 @@ class Samples(NamedTuple):
         shown: (n,) float32 sum of the luminance of its samples, of each no more than white.
         square: (n,) float32 sum of the squares of these.
         number: (n,) int32 how many samples.
+        colour: (n,) int32 what the screen last showed for them, see `reconstruction`; 0 where that has to be made anew.
     """
 
     total: NDArray[np.float32]
     shown: NDArray[np.float32]
     square: NDArray[np.float32]
     number: NDArray[np.int32]
+    colour: NDArray[np.int32]
 
 
 class Spread(NamedTuple):
@@ -93,6 +95,7 @@ class SampleStore:
             shown=apart(slots, np.float32),
             square=apart(slots, np.float32),
             number=apart(slots, np.int32, zeroed=True),
+            colour=apart(slots, np.int32, zeroed=True),
         )
 
     @contextmanager
@@ -349,4 +352,5 @@ def add_samples(
         if decided:
             squares[slot] = square
         count[slot] = until[index]
+        samples.colour[slot] = 0
     return not_a_number, negative, too_bright

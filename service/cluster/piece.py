@@ -210,3 +210,4 @@ def _set_sums(store: SampleStore, slots: NDArray[np.integer], numbers: bytes) ->
     values = np.frombuffer(numbers, dtype=np.float32).reshape(len(columns), -1)
     for column, value in zip(columns, values, strict=True):
         column[slots] = value
+    store.samples.colour[slots] = 0

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from renderer.cellmap import CellMap
 from renderer.gaze import GazeBucket
 from renderer.reconstruction import reconstruct
-from renderer.store import Samples
+from renderer.store import Samples, SampleStore, add_samples
 from renderer.tonemap import encode_srgb
 from renderer.workers import WorkerPool
 
@@ -36,7 +36,13 @@ def random_cells(seed: int, width: int, height: int) -> tuple[CellMap, NDArray[n
     total = (10 ** rng.uniform(-4, 1, (2 * cells, 3)) * count[:, None]).astype(np.float32)
     total[rng.random(2 * cells) < 0.1] = 0.0
     cell_map = CellMap("aligned", GazeBucket(0, 0, 0), zeros, zeros.copy(), zeros + 1, mask)
-    return cell_map, slots, Samples(total, np.zeros(2 * cells, np.float32), np.zeros(2 * cells, np.float32), count)
+    unused = np.zeros(2 * cells, np.float32)
+    return cell_map, slots, Samples(total, unused, unused, count, np.zeros(2 * cells, np.int32))
+
+
+def fresh(samples: Samples) -> Samples:
+    """The same, never shown."""
+    return samples._replace(colour=np.zeros_like(samples.colour))
 
 
 @given(st.integers(0, 2**32), st.integers(1, 40), st.integers(1, 150))
@@ -65,11 +71,30 @@ def test_threads_change_nothing(pool: WorkerPool) -> None:
     cell_map, slots, samples = random_cells(7, 300, 500)
     alone = WorkerPool(1)
     for linear in (False, True):
-        np.testing.assert_array_equal(
-            reconstruct(cell_map, slots, samples, 1.5, linear, pool),
-            reconstruct(cell_map, slots, samples, 1.5, linear, alone),
-        )
+        together = reconstruct(cell_map, slots, fresh(samples), 1.5, linear, pool)
+        np.testing.assert_array_equal(together, reconstruct(cell_map, slots, fresh(samples), 1.5, linear, alone))
     alone.close()
+
+
+@given(st.integers(0, 2**32), st.integers(1, 40), st.integers(1, 150))
+def test_what_was_shown_before_changes_nothing(pool: WorkerPool, seed: int, width: int, height: int) -> None:
+    """Some cells seen before, and some of these with further samples since: as if all were seen for the first time."""
+    cell_map, slots, samples = random_cells(seed, width, height)
+    store, rng = SampleStore(len(samples.number)), np.random.default_rng(seed)
+    for mine, theirs in zip(store.samples, samples, strict=True):
+        mine[:] = theirs
+    half = -(-cell_map.cells // 2)
+    zeros = np.zeros(half, np.int32)
+    seen = CellMap("aligned", cell_map.bucket, zeros, zeros, zeros + 1, cell_map.mask % half)
+    reconstruct(seen, slots[:half], store.samples, 2.0, False, pool)
+    chosen = np.flatnonzero(rng.random(cell_map.cells) < 0.3).astype(np.int32)
+    until = store.samples.number[slots[chosen]] + 1
+    light = rng.random((len(chosen), 3), dtype=np.float32)
+    add_samples(store.samples, store.spread, store.white, slots, chosen, until, light)
+    np.testing.assert_array_equal(
+        reconstruct(cell_map, slots, store.samples, 2.0, False, pool),
+        reconstruct(cell_map, slots, fresh(store.samples), 2.0, False, pool),
+    )
 
 
 @pytest.mark.parametrize("exposure", [1e-12, 1e12])

@@ -39,7 +39,8 @@ def pool() -> Iterator[WorkerPool]:
 def samples_of(means: NDArray[np.float64]) -> Samples:
     """One sample a cell with the given mean."""
     n = len(means)
-    return Samples(means.astype(np.float32), np.zeros(n, np.float32), np.zeros(n, np.float32), np.ones(n, np.int32))
+    zeros = np.zeros(n, np.float32)
+    return Samples(means.astype(np.float32), zeros, zeros, np.ones(n, np.int32), np.zeros(n, np.int32))
 
 
 def grid(side: int, columns: int, rows: int) -> CellMap:

@@ -88,7 +88,7 @@ def test_the_fovea_is_all_within_its_angle_of_the_gaze(
     pool: WorkerPool, gaze: tuple[float, float], width_cm: float, height_cm: float, distance_cm: float
 ) -> None:
     """However obliquely the eye looks: cells of a pixel, each with an error of its own, weighed as that angle says."""
-    display = Display(48, 32, width_cm, height_cm, distance_cm)
+    display = Display(47, 31, width_cm, height_cm, distance_cm)
     rng = np.random.default_rng(5)
     store = SampleStore(display.pixels)
     mean, error = rng.uniform(0.0, 1.0, (2, display.pixels))
@@ -106,3 +106,16 @@ def test_the_fovea_is_all_within_its_angle_of_the_gaze(
     else:
         assert stated.foveal_rms is None
     assert stated.rms == pytest.approx(math.sqrt(error.mean()), rel=1e-4)
+    assert stated.guessed == 0.0
+
+
+def test_the_share_that_was_guessed_is_that_of_cells_with_one_sample(pool: WorkerPool) -> None:
+    """In pixels of a screen whose last cells fill no group."""
+    display = Display(47, 31)
+    store = SampleStore(display.pixels)
+    store.samples.number[:] = np.random.default_rng(6).integers(1, 4, display.pixels)
+    store.samples.shown[:], store.samples.square[:] = store.samples.number, store.samples.number
+    cells = build_cell_map("full", display, Acuity(), GazeBucket(0.0, 0.0, 16), pool)
+    slots = slots_of(cells, pool)
+    stated = stated_error(display, Gaze(20.0, 10.0), cells, slots, store.samples, 1.0, pool)
+    assert stated.guessed == (store.samples.number == 1).mean()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 import pickle
 
@@ -79,6 +80,8 @@ def test_frames_by_pieces_are_the_frames_of_threads(
         np.testing.assert_array_equal(one.pixels, other.pixels)
         for name in ("rays", "cells_traced", "samples_traced", "rms_error", "foveal_rms_error", "rejected_samples"):
             assert getattr(one.cost, name) == getattr(other.cost, name), name
+        coded = dataclasses.replace(request, linear=False)
+        np.testing.assert_array_equal(apart.render(scene, coded).pixels, here.render(scene, coded).pixels)
     apart.close()
     here.close()
 
