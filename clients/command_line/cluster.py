@@ -61,7 +61,7 @@ def joined(address: str, threads: int | None) -> Iterator[Cluster]:
 
     cluster = Cluster(address, threads, lambda line: print(f"gazetrace: {line}", file=sys.stderr))
     try:
-        with working(f"joining the cluster {address}; where kernels are compiled, that takes up to a minute"):
+        with working(f"joining the cluster {address}; where kernels are compiled, that takes a minute or two"):
             cluster.wait_ready(PATIENCE_S)
         yield cluster
     finally:

@@ -76,7 +76,7 @@ def _address(process: subprocess.Popen[str]) -> str:
     """Where it listens, once it is ready."""
     said = ""
     assert process.stdout is not None
-    with working("starting a service; the first time its kernels are compiled, which takes up to a minute"):
+    with working("starting a service; the first time its kernels are compiled, which takes a minute or two"):
         for line in process.stdout:
             said += line
             if line.startswith("ready in"):

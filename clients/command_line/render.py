@@ -136,7 +136,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def ready_renderer(threads: int | None, *, keeps: bool = True) -> Renderer:
     """A renderer whose kernels are compiled; one that keeps nothing from frame to frame unless it `keeps`."""
-    with working("loading kernels; the first time they are compiled, which takes up to a minute"):
+    with working("loading kernels; the first time they are compiled, which takes a minute or two"):
         from renderer.pipeline import Renderer
 
         renderer = Renderer(threads) if keeps else Renderer(threads, map_cache_bytes=0, store_bytes=0)
