@@ -40,19 +40,30 @@ def interrupted(when: bytes, *words: str, stdout: IO[bytes] | None = None) -> by
     os.close(terminal)
     seen = b""
     deadline = time.monotonic() + PATIENCE_S
-    while not re.search(when, seen):
-        assert select.select([screen], [], [], deadline - time.monotonic())[0], seen
-        seen += os.read(screen, 4096)
-    process.send_signal(signal.SIGINT)
-    while True:
-        try:
-            seen += os.read(screen, 4096)
-        except OSError:  # the other end of the terminal is closed
-            break
-    assert process.wait(PATIENCE_S) == 130
-    os.close(screen)
+    try:
+        while not re.search(when, seen):
+            assert select.select([screen], [], [], deadline - time.monotonic())[0], seen
+            more = _shown(screen)
+            assert more, f"it ended before it could be stopped: {seen!r}"
+            seen += more
+        process.send_signal(signal.SIGINT)
+        while more := _shown(screen):
+            seen += more
+        assert process.wait(PATIENCE_S) == 130
+    finally:
+        process.kill()
+        process.wait()
+        os.close(screen)
     assert b"Traceback" not in seen
     return seen
+
+
+def _shown(screen: int) -> bytes:
+    """What a terminal shows next; nothing once its other end is closed."""
+    try:
+        return os.read(screen, 4096)
+    except OSError:
+        return b""
 
 
 def failing(capsys: pytest.CaptureFixture[str], *words: str, status: int = 2) -> str:
