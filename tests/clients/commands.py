@@ -49,12 +49,12 @@ def interrupted(when: bytes, *words: str, stdout: IO[bytes] | None = None) -> by
         process.send_signal(signal.SIGINT)
         while more := _shown(screen):
             seen += more
-        assert process.wait(PATIENCE_S) == 130
+        assert process.wait(PATIENCE_S) == 130, seen
     finally:
         process.kill()
         process.wait()
         os.close(screen)
-    assert b"Traceback" not in seen
+    assert b"Traceback" not in seen, seen
     return seen
 
 
