@@ -45,9 +45,12 @@ def test_a_byte_takes_ten_bits(terminal: Terminal) -> None:
 
 def test_silence_is_told_after_a_short_wait(terminal: Terminal) -> None:
     port = SerialPort(str(terminal.path), 115_200, dtr=False)
-    begin = time.monotonic()
-    assert port.read() is None
-    assert WAIT_S * 0.9 < time.monotonic() - begin < PATIENCE_S
+    took = []
+    for _ in range(10):
+        begin = time.monotonic()
+        assert port.read() is None
+        took.append(time.monotonic() - begin)
+    assert WAIT_S * 0.9 < min(took) < 2 * WAIT_S  # the shortest: a busy machine makes some of them longer
     port.close()
 
 
