@@ -150,6 +150,11 @@ def first_shadow_rays(rays: ShadowRays, count: int) -> ShadowRays:
     )
 
 
+def _column_bytes(capacity: int, size: int) -> int:
+    """From the first of `capacity` numbers of `size` bytes to that of the next column."""
+    return -(-(capacity + LANES) * size // PAGE) * PAGE + STAGGER
+
+
 def make_columns(count: int, capacity: int, kind: Any = np.float32, levels: int = 1) -> list[NDArray[Any]]:
     """`count` columns of (capacity,) zeros, with memory behind each that LANES numbers at once may run into.
 
@@ -158,7 +163,7 @@ def make_columns(count: int, capacity: int, kind: Any = np.float32, levels: int 
     after those of the level before; between them are the other columns, so that what is written together lies together.
     """
     size = np.dtype(kind).itemsize
-    apart = -(-(capacity + LANES) * size // PAGE) * PAGE + STAGGER
+    apart = _column_bytes(capacity, size)
     room = sparse(levels * count * apart // size, kind)
     return [
         room[column * apart // size :][: (levels - 1) * count * apart // size + capacity] for column in range(count)
@@ -171,7 +176,7 @@ RAY_COLUMNS = 12
 
 def level_rows(capacity: int) -> int:
     """Rows from the first of one level of rays to that of the next, where each has `capacity` of them."""
-    return RAY_COLUMNS * (-(-(capacity + LANES) * 4 // PAGE) * PAGE + STAGGER) // 4
+    return RAY_COLUMNS * _column_bytes(capacity, 4) // 4
 
 
 def make_rays(capacity: int, levels: int = 1) -> Rays:
