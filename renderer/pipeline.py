@@ -48,6 +48,7 @@ class Renderer:
         map_cache_bytes: int = DEFAULT_MAP_CACHE_BYTES,
         store_bytes: int = DEFAULT_STORE_BYTES,
         tracing: Tracing | None = None,
+        abandon: threading.Event | None = None,
     ) -> None:
         """Start the threads.
 
@@ -55,6 +56,7 @@ class Renderer:
             threads: how many; None for all cores.
             map_cache_bytes, store_bytes: room for cell maps and for samples.
             tracing: what traces samples; None for the threads.
+            abandon: set it to give up every frame that has no event of its own, this one and all after it.
         """
         keep_freed_memory()
         keep_spare_pages((map_cache_bytes + store_bytes) // CACHES_TO_SPARE)
@@ -63,6 +65,7 @@ class Renderer:
         self.store_cache = self._memory.stores
         self._pool = WorkerPool(threads)
         self._tracing = tracing or ThreadTracing()
+        self._abandon = abandon
         self._pace = Pace(self._pool.threads)
 
     @property
@@ -97,12 +100,12 @@ class Renderer:
         Args:
             prepared: the scene.
             request: the frame.
-            abandon: set it, from another thread, to give up the frame.
+            abandon: set it, from another thread, to give up the frame; None for the renderer's own.
 
         Raises:
             Abandoned: within about a block of rays after `abandon` is set. What was traced by then is kept.
         """
-        return self._render(prepared, request, abandon, self._tracing)
+        return self._render(prepared, request, abandon or self._abandon, self._tracing)
 
     def _render(
         self, prepared: PreparedScene, request: FrameRequest, abandon: threading.Event | None, tracing: Tracing

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import argparse
+import threading
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Final
 
 from clients.command_line.accuracy_folder import REFERENCE_FRAME, AccuracyFolder
+from clients.command_line.interrupt import heeding
 from clients.command_line.progress import counting
 from clients.command_line.render import ready_renderer
 
@@ -37,43 +40,84 @@ def measure_missing(
     cluster: Cluster | None = None,
 ) -> None:
     """Render, compare and time what an earlier run has not, here or on the workers of a cluster."""
-    from renderer.accuracy.timing import timed_frame, turn
+    todo = _todo(settings, arguments.repeats, kept)
+    if todo.compare and not kept.holds_radiance:
+        _render_reference(arguments, prepared, view, settings, kept, cluster)
+    if not todo.compare and not todo.time:
+        return
+    if cluster is None:
+        _measure_here(arguments, prepared, view, todo, kept)
+    else:
+        _measure_on(cluster, prepared, view, todo, kept)
 
-    untimed = [
+
+@dataclass(frozen=True, slots=True)
+class _Todo:
+    """What is to be measured, and what an earlier run has not.
+
+    Attributes:
+        settings, repeats: all there are; each setting is timed so often.
+        compare: those settings that are to be held against the reference.
+        time: those repeats that are to be timed, in turn.
+    """
+
+    settings: int
+    repeats: int
+    compare: tuple[Setting, ...]
+    time: tuple[tuple[int, Setting], ...]
+
+    def comparing(self) -> AbstractContextManager[Callable[[], None]]:
+        return counting("comparing settings", self.settings, done=self.settings - len(self.compare))
+
+    def timing(self) -> AbstractContextManager[Callable[[], None]]:
+        total = self.repeats * self.settings
+        return counting("timing settings in turn", total, done=total - len(self.time))
+
+
+def _todo(settings: Sequence[Setting], repeats: int, kept: AccuracyFolder) -> _Todo:
+    from renderer.accuracy.timing import turn
+
+    compare = tuple(setting for setting in settings if setting.id not in kept.measured)
+    time = tuple(
         (repeat, setting)
-        for repeat in range(arguments.repeats)
+        for repeat in range(repeats)
         for setting in turn(settings, repeat)
         if repeat not in kept.times.get(setting.id, {})
-    ]
-    unmeasured = [setting for setting in settings if setting.id not in kept.measured]
-    if unmeasured and not kept.holds_radiance:
-        _render_reference(arguments, prepared, view, settings, kept, cluster)
-    if not unmeasured and not untimed:
-        return
-    renderer = ready_renderer(arguments.threads, keeps=False) if cluster is None else None
-    with counting("comparing settings", len(settings), done=len(settings) - len(unmeasured)) as tick:
-        if renderer is not None:
-            _measure(renderer, prepared, view, unmeasured, kept, tick)
-        elif unmeasured and cluster is not None:
-            from clients.command_line.accuracy_cluster import Truth, compare_on
+    )
+    return _Todo(len(settings), repeats, compare, time)
 
+
+def _measure_here(
+    arguments: argparse.Namespace, prepared: PreparedScene, view: FrameRequest, todo: _Todo, kept: AccuracyFolder
+) -> None:
+    from renderer.accuracy.timing import timed_frame
+
+    stop = threading.Event()
+    renderer = ready_renderer(arguments.threads, keeps=False, abandon=stop)
+    with heeding(stop):
+        with todo.comparing() as tick:
+            _measure(renderer, prepared, view, todo.compare, kept, tick)
+        if todo.time and not todo.compare:
+            timed_frame(renderer, prepared, view, todo.time[0][1])  # a first frame of a scene is slow
+        with todo.timing() as tick:
+            for repeat, setting in todo.time:
+                kept.keep_time(setting.id, repeat, timed_frame(renderer, prepared, view, setting))
+                tick()
+    renderer.close()
+
+
+def _measure_on(
+    cluster: Cluster, prepared: PreparedScene, view: FrameRequest, todo: _Todo, kept: AccuracyFolder
+) -> None:
+    from clients.command_line.accuracy_cluster import Truth, compare_on, time_on
+
+    with todo.comparing() as tick:
+        if todo.compare:
             radiance = kept.radiance((view.display.height_px, view.display.width_px))
             truth = Truth(view, radiance, prepared.scene.exposure, judges())
-            compare_on(cluster, prepared, unmeasured, truth, kept, tick)
-    if renderer is not None and untimed and not unmeasured:
-        timed_frame(renderer, prepared, view, settings[0])  # a first frame of a scene is slow
-    total = arguments.repeats * len(settings)
-    with counting("timing settings in turn", total, done=total - len(untimed)) as tick:
-        if cluster is not None:
-            from clients.command_line.accuracy_cluster import time_on
-
-            time_on(cluster, prepared, view, untimed, kept, tick)
-        for repeat, setting in () if renderer is None else untimed:
-            assert renderer is not None
-            kept.keep_time(setting.id, repeat, timed_frame(renderer, prepared, view, setting))
-            tick()
-    if renderer is not None:
-        renderer.close()
+            compare_on(cluster, prepared, todo.compare, truth, kept, tick)
+    with todo.timing() as tick:
+        time_on(cluster, prepared, view, todo.time, kept, tick)
 
 
 def _render_reference(
@@ -91,8 +135,9 @@ def _render_reference(
 
     samples, spared = arguments.reference_samples, most_samples(settings)
     ready_renderer(arguments.threads).close()
-    renderer = Renderer(arguments.threads, store_bytes=STORE_BYTES, tracing=cluster)
-    with counting("rendering the reference", len(rounds(samples, spared))) as tick:
+    stop = threading.Event()
+    renderer = Renderer(arguments.threads, store_bytes=STORE_BYTES, tracing=cluster, abandon=stop)
+    with heeding(stop), counting("rendering the reference", len(rounds(samples, spared))) as tick:
         found = render_reference(renderer, prepared, view, samples, spared, tick)
     renderer.close()
     reference = Reference(samples, found.standard_error, round(found.seconds, 3), REFERENCE_FRAME)

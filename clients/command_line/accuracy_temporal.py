@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 import shlex
+import threading
 from dataclasses import asdict
 from datetime import UTC, datetime
 from importlib import metadata
@@ -15,6 +16,7 @@ from clients.command_line.errors import OK, UsageError
 from clients.command_line.fingerprint import fingerprint
 from clients.command_line.frame_flags import frame_request
 from clients.command_line.gaze_trace_flags import playback_of
+from clients.command_line.interrupt import heeding
 from clients.command_line.journal import Journal
 from clients.command_line.progress import counting, say
 from clients.command_line.render import ready_renderer, write_whole
@@ -100,8 +102,9 @@ def _measured(
 
     total, done = len(WAYS) * (len(walk) - 1), sum(len(steps.of(way)) for way in WAYS)
     if done < total:
-        renderer = ready_renderer(arguments.threads)
-        with counting(f"moving the gaze over {arguments.scene}", total, done) as tick:
+        stop = threading.Event()
+        renderer = ready_renderer(arguments.threads, abandon=stop)
+        with heeding(stop), counting(f"moving the gaze over {arguments.scene}", total, done) as tick:
             for way in WAYS:
                 for step in flicker_steps(renderer, prepared, view, walk, way, len(steps.of(way))):
                     steps.keep(way, step)

@@ -6,6 +6,7 @@ import argparse
 import json
 import math
 import re
+import threading
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -22,6 +23,7 @@ from clients.command_line.fingerprint import fingerprint
 from clients.command_line.frame_flags import add_frame_flags, frame_request
 from clients.command_line.frame_folder import FrameFolder
 from clients.command_line.gaze_trace_flags import Playback, add_gaze_trace_flags, playback_of
+from clients.command_line.interrupt import heeding
 from clients.command_line.progress import counting, milliseconds_since, say
 from clients.command_line.render import OVERLAYS, add_threads, check_threads, cost_record, draw_overlays, ready_renderer
 from clients.command_line.scene_argument import SCENE_HELP, add_scenes_folder, load_scene
@@ -254,15 +256,17 @@ def render_missing(
     missing = [frame for frame in range(len(shots)) if frame not in frames.costs]
     if not missing:
         return
-    with counting(f"rendering {arguments.scene}", len(shots), done=len(shots) - len(missing)) as tick:
-        if arguments.cluster is not None:
-            with joined(arguments.cluster, arguments.threads) as cluster:
-                tasks = [partial(drawn, shots[frame], arguments.overlay) for frame in missing]
-                for number, (picture, cost) in cluster.run(prepared, tasks):
-                    frames.add(missing[number], picture, cost)
-                    tick()
-            return
-        renderer = ready_renderer(arguments.threads)
+    text, done = f"rendering {arguments.scene}", len(shots) - len(missing)
+    if arguments.cluster is not None:
+        with joined(arguments.cluster, arguments.threads) as cluster, counting(text, len(shots), done) as tick:
+            tasks = [partial(drawn, shots[frame], arguments.overlay) for frame in missing]
+            for number, (picture, cost) in cluster.run(prepared, tasks):
+                frames.add(missing[number], picture, cost)
+                tick()
+        return
+    stop = threading.Event()
+    renderer = ready_renderer(arguments.threads, abandon=stop)
+    with heeding(stop), counting(text, len(shots), done) as tick:
         for frame in missing:
             frames.add(frame, *drawn(shots[frame], arguments.overlay, renderer, prepared))
             tick()

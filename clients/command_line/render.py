@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import threading
 import time
 from dataclasses import asdict
 from pathlib import Path
@@ -134,12 +135,12 @@ def run(arguments: argparse.Namespace) -> int:
     return OK
 
 
-def ready_renderer(threads: int | None, *, keeps: bool = True) -> Renderer:
+def ready_renderer(threads: int | None, *, keeps: bool = True, abandon: threading.Event | None = None) -> Renderer:
     """A renderer whose kernels are compiled; one that keeps nothing from frame to frame unless it `keeps`."""
     with working("loading kernels; the first time they are compiled, which takes a minute or two"):
         from renderer.pipeline import Renderer
 
-        renderer = Renderer(threads) if keeps else Renderer(threads, map_cache_bytes=0, store_bytes=0)
+        renderer = Renderer(threads, abandon=abandon) if keeps else Renderer(threads, 0, 0, abandon=abandon)
         renderer.warm_up()
     return renderer
 
