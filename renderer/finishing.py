@@ -55,7 +55,7 @@ def _bumped(
     mapped = normal_picture >= 0
     flat = mapped & (group.primitive < len(surfaces.facets))
     x, y, z = filtered(
-        textures.texels, textures.signed, textures.pictures, choose(mapped, normal_picture, 0), area, s.u, s.v
+        mapped, textures.texels, textures.signed, textures.pictures, choose(mapped, normal_picture, 0), area, s.u, s.v
     )
     scale = entry(surfaces.materials["normal_scale"], row)
     x, y = x * scale, y * scale
@@ -107,11 +107,11 @@ def finish_off(surfaces: Surfaces, group: Group, seen: Any, rows: NDArray[np.flo
         area = covered_area(s, group.width, held(rows, DENSITY), group.dx, group.dy, group.dz)
         drawn = picture >= 0
         if anywhere(drawn):
-            r, g, b = filtered(texels, linear, pictures, choose(drawn, picture, 0), area, s.u, s.v)
+            r, g, b = filtered(drawn, texels, linear, pictures, choose(drawn, picture, 0), area, s.u, s.v)
             kr, kg, kb = choose(drawn, kr * r, kr), choose(drawn, kg * g, kg), choose(drawn, kb * b, kb)
         drawn = specular_picture >= 0
         if anywhere(drawn):
-            r, g, b = filtered(texels, linear, pictures, choose(drawn, specular_picture, 0), area, s.u, s.v)
+            r, g, b = filtered(drawn, texels, linear, pictures, choose(drawn, specular_picture, 0), area, s.u, s.v)
             sr, sg, sb = choose(drawn, sr * r, sr), choose(drawn, sg * g, sg), choose(drawn, sb * b, sb)
             mr, mg, mb = choose(drawn, mr * r, mr), choose(drawn, mg * g, mg), choose(drawn, mb * b, mb)
         if anywhere(normal_picture >= 0):

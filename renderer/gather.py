@@ -10,7 +10,20 @@ from llvmlite import ir
 from numba.core import cgutils, types
 from numba.extending import intrinsic
 
-from renderer.lanes import FLOATS, INTS, LANES, WORDS, Lanes, alike, as_lanes, either, spread, vector
+from renderer.lanes import (
+    FLOATS,
+    INTS,
+    LANES,
+    WORDS,
+    Lanes,
+    alike,
+    as_lanes,
+    each_marked,
+    either,
+    lane_of,
+    spread,
+    vector,
+)
 
 OCTET = 8
 """Numbers of a row that are read together."""
@@ -297,13 +310,13 @@ def _add_marked(_context: Any, table: Any, mark: Any, row: Any, red: Any, green:
             for value, given in zip(arguments[3:], (red, green, blue), strict=True)
         ]
         kind = target.get_data_type(table.dtype).as_pointer()
-        for lane in map(_INDEX, range(LANES)):
-            with builder.if_then(builder.extract_element(marked, lane)):
-                to = builder.extract_element(rows, lane)
-                for part, lanes in enumerate(columns):
-                    address = _place(target, builder, table, array, [to, _ADDRESS(part)])
-                    pointer = builder.inttoptr(address, kind)
-                    builder.store(builder.fadd(builder.load(pointer), builder.extract_element(lanes, lane)), pointer)
+        rooms = [cgutils.alloca_once_value(builder, value) for value in (rows, *columns)]
+        with each_marked(builder, marked) as lane:
+            to, *parts = (builder.load(lane_of(builder, room, lane)) for room in rooms)
+            for part, value in enumerate(parts):
+                address = _place(target, builder, table, array, [to, _ADDRESS(part)])
+                pointer = builder.inttoptr(address, kind)
+                builder.store(builder.fadd(builder.load(pointer), value), pointer)
         return target.get_dummy_value()
 
     return types.void(table, mark, row, red, green, blue), generate

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.bilinear import four_texels
 from renderer.gather import entry
 from renderer.kernel import formula
 from renderer.lanes import anywhere, binary_logarithm, choose, floor, least, most, whole
@@ -66,17 +67,8 @@ def neighbours(position: float, length: int, mode: int) -> tuple[int, int, float
 
 
 @formula
-def _mixed(
-    decoded: NDArray[np.float64], shift: int, a: int, b: int, c: int, d: int, wa: float, wb: float, wc: float, wd: float
-) -> float:
-    """The weighted sum of one channel of four texels."""
-    upper = wa * entry(decoded, a >> shift & 255) + wb * entry(decoded, b >> shift & 255)
-    mixed: float = upper + wc * entry(decoded, c >> shift & 255) + wd * entry(decoded, d >> shift & 255)
-    return mixed
-
-
-@formula
 def look_up(
+    mark: bool,
     texels: NDArray[np.uint32],
     linear: NDArray[np.float64],
     pictures: NDArray[np.void],
@@ -89,8 +81,9 @@ def look_up(
     """Bilinear linear-light colour at a place of one level of a picture; texel centres at half-integers.
 
     Args:
+        mark: where to look; elsewhere it is black. This and all but the arrays are lanes.
         texels, linear, pictures: of the atlas.
-        row: of the level among `pictures`; this and what follows are numbers or lanes.
+        row: of the level among `pictures`.
         across, down: share of its width and height, 0 to 1, from its upper left.
         wrap_u, wrap_v: REPEAT, CLAMP or MIRROR.
     """
@@ -98,14 +91,10 @@ def look_up(
     left, right, fx = neighbours(across * width, width, wrap_u)
     top, bottom, fy = neighbours(down * height, height, wrap_v)
     upper, lower = start + top * width, start + bottom * width
-    a, b = entry(texels, upper + left), entry(texels, upper + right)
-    c, d = entry(texels, lower + left), entry(texels, lower + right)
-    wa, wb, wc, wd = (1 - fx) * (1 - fy), fx * (1 - fy), (1 - fx) * fy, fx * fy
-    return (
-        _mixed(linear, 0, a, b, c, d, wa, wb, wc, wd),
-        _mixed(linear, 8, a, b, c, d, wa, wb, wc, wd),
-        _mixed(linear, 16, a, b, c, d, wa, wb, wc, wd),
-    )
+    return four_texels(  # type: ignore[no-any-return]
+        mark, texels, linear, upper + left, upper + right, lower + left, lower + right,
+        (1 - fx) * (1 - fy), fx * (1 - fy), (1 - fx) * fy, fx * fy,
+    )  # fmt: skip
 
 
 @formula
@@ -141,6 +130,7 @@ def level_of(area: float, texels: float) -> float:
 
 @formula
 def filtered(
+    mark: bool,
     texels: NDArray[np.uint32],
     linear: NDArray[np.float64],
     pictures: NDArray[np.void],
@@ -152,8 +142,9 @@ def filtered(
     """Colour at (u, v) of a picture as it is seen by a footprint: between the two levels next to its size.
 
     Args:
+        mark: where to look; elsewhere it is black. This and all but the arrays are lanes.
         texels, linear, pictures: of the atlas; its `signed` in place of `linear` for a normal map.
-        row: of the picture's largest level; this and what follows are numbers or lanes.
+        row: of the picture's largest level.
         area: of the footprint in texture coordinates.
         u, v: texture coordinates.
     """
@@ -161,12 +152,12 @@ def filtered(
     across, down = within(u, wrap_u), 1.0 - within(v, wrap_v)
     level = least(level_of(area, entry(pictures["texels"], row)), entry(pictures["levels"], row) - 1.0)
     larger = whole(most(0.0, level))
-    red, green, blue = look_up(texels, linear, pictures, row + larger, across, down, wrap_u, wrap_v)
+    red, green, blue = look_up(mark, texels, linear, pictures, row + larger, across, down, wrap_u, wrap_v)
     share = level - larger
-    between = share > 0.0
+    between = mark & (share > 0.0)
     if anywhere(between):
         smaller = row + larger + choose(between, 1, 0)
-        r, g, b = look_up(texels, linear, pictures, smaller, across, down, wrap_u, wrap_v)
+        r, g, b = look_up(between, texels, linear, pictures, smaller, across, down, wrap_u, wrap_v)
         share = choose(between, share, 0.0)
         red, green, blue = red + share * (r - red), green + share * (g - green), blue + share * (b - blue)
     return red, green, blue
