@@ -16,12 +16,15 @@ from renderer.surface import Surface
 
 INVERSE_PI = 1.0 / math.pi
 
+FAINT = 150.0 * math.log(2.0)
+"""c^n is at most e^(-n (1 - c)); where that is less than 2^-150 float32 has it as 0, and it is not worked out."""
+
 
 @formula
 def phong_lobe(
     shiny: bool, s: Surface, lx: float, ly: float, lz: float, vx: float, vy: float, vz: float, shininess: float
 ) -> float:
-    """(R.V)^shininess, R the mirror image of the direction to the light; 0 where R faces away from V.
+    """(R.V)^shininess, R the mirror image of the direction to the light; 0 where R faces away from V, or it is FAINT.
 
     Args:
         shiny: whether to work it out; else it is 0.
@@ -32,7 +35,8 @@ def phong_lobe(
     """
     twice = 2.0 * (s.nx * lx + s.ny * ly + s.nz * lz)
     cosine = (twice * s.nx - lx) * vx + (twice * s.ny - ly) * vy + (twice * s.nz - lz) * vz
-    return power(shiny & (cosine > 0.0), least(1.0, cosine), shininess)
+    there = (cosine > 0.0) & (shininess * (1.0 - cosine) < FAINT)
+    return power(shiny & there, least(1.0, cosine), shininess)
 
 
 @formula

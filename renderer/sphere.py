@@ -145,6 +145,8 @@ def hit_distance(
     lx, ly, lz = fx + step * dx, fy + step * dy, fz + step * dz
     spare = radius * radius - (lx * lx + ly * ly + lz * lz)
     meets = spare >= 0.0
+    if not anywhere(meets):
+        return choose(meets, 0.0, math.inf)
     half = root(a * choose(meets, spare, 0.0))
     q = choose(b >= 0.0, b + half, b - half)
     far = root(fx * fx + fy * fy + fz * fz)

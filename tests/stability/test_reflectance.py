@@ -253,8 +253,17 @@ def test_h41_the_lobe_on_rounded_vectors(exponent: float, angle_deg: float, leng
     cosine = min(np.longdouble(1), wide[2] / np.sqrt((wide * wide).sum()))
     truth = float(cosine ** np.longdouble(exponent)) if cosine > 0 else 0.0
     found = phong(UP, eye.astype(np.float64), exponent)
-    assert found == pytest.approx(truth, rel=1e-14 + exponent * 2.0**-52, abs=1e-300)
+    assert found == pytest.approx(truth, rel=1e-14 + exponent * 2.0**-52, abs=2.0**-150)
     assert 0.0 <= found <= 1.0
+
+
+@given(exponents, st.floats(2.0**-40, 110.0))
+def test_h41_the_foot_of_a_lobe_is_left_out_where_float32_has_nothing_of_it(exponent: float, height: float) -> None:
+    """Light at such an angle that the lobe is about e^-height of its peak: 2^-150 is e^-104."""
+    cosine = math.exp(-height / max(exponent, 1.0))
+    found = phong((math.sqrt(1.0 - cosine * cosine), 0.0, cosine), (0.0, 0.0, 1.0), exponent)
+    assert np.float32(found) == np.float32(cosine**exponent)
+    assert found in (0.0, cosine**exponent)
 
 
 def test_h41_a_mirrored_light_behind_the_eye_gives_nothing() -> None:
