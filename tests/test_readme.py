@@ -84,7 +84,7 @@ def test_what_ci_installs_is_what_the_readme_says() -> None:
     for extra in ("peers", "cluster"):
         assert f"pip install -q -c .ci/constraints.txt -e '.[{extra}]'" in script
     packages = set(re.findall(r"--no-install-recommends (\S+)", script))
-    assert packages == {"chromium", "assimp-testmodels", "povray"}
+    assert packages == {"chromium", "assimp-testmodels", "povray", "prometheus"}
     assert {package for package in packages if f"`{package}`" in README} == packages - {"chromium"}
 
 
