@@ -24,7 +24,7 @@ from renderer.refinement import refine
 from renderer.smooth import reconstruct_smooth
 from renderer.standard_error import StatedError, stated_error
 from renderer.tracing import ThreadTracing, Tracing
-from renderer.warmup import every_effect
+from renderer.warmup import every_effect, nothing_behind
 from renderer.whitted import view_of
 from renderer.workers import WorkerPool
 
@@ -194,5 +194,6 @@ class Renderer:
             Quality(antialiasing="adaptive", samples_per_cell=8),
         ):
             self._render(scene, FrameRequest(Gaze(0.0, 0.0), display, None, quality), None, here)
+        self._render(prepare(nothing_behind()), FrameRequest(Gaze(0.0, 0.0), display, None, Quality()), None, here)
         eccentricity_deg(display, Gaze(0.0, 0.0))
         self._pace = Pace(self.threads)

@@ -1,6 +1,8 @@
-"""A scene that passes through every kernel, to compile them before the first user's frame needs them."""
+"""Scenes that pass through every kernel, to compile them before the first user's frame needs them."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 
@@ -35,3 +37,11 @@ def every_effect() -> Scene:
         ),
         camera=Camera((0.0, 2.0, 7.0), (0.0, 1.0, 0.0)),
     )
+
+
+def nothing_behind() -> Scene:
+    """The same without holes, glass or water: rays end at the first thing in their way, for which there is a kernel."""
+    scene = every_effect()
+    (floor,) = scene.meshes
+    solid = replace(floor, material=replace(floor.material, alpha_texture=None))
+    return replace(scene, meshes=(solid,), spheres=scene.spheres[:1])

@@ -248,13 +248,6 @@ def test_the_caches_count(scene: PreparedScene) -> None:
     fresh.close()
 
 
-def test_warming_up_leaves_nothing_to_compile() -> None:
-    fresh = Renderer(threads=1)
-    fresh.warm_up()
-    assert fresh.map_cache.entries > 0
-    fresh.close()
-
-
 def test_a_black_scene_is_black(renderer: Renderer) -> None:
     for scene in (Scene(), Scene(meshes=(floor(Material(diffuse=BLACK)),), lights=(light(0, 3, 0),))):
         frame = shoot(renderer, scene, 8, 8, linear=False)
