@@ -91,10 +91,11 @@ def look_up(
     left, right, fx = neighbours(across * width, width, wrap_u)
     top, bottom, fy = neighbours(down * height, height, wrap_v)
     upper, lower = start + top * width, start + bottom * width
-    return four_texels(  # type: ignore[no-any-return]
+    red, green, blue = four_texels(
         mark, texels, linear, upper + left, upper + right, lower + left, lower + right,
         (1 - fx) * (1 - fy), fx * (1 - fy), (1 - fx) * fy, fx * fy,
     )  # fmt: skip
+    return red, green, blue
 
 
 @formula
