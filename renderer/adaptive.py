@@ -21,7 +21,8 @@ from numpy.typing import NDArray
 
 from renderer.cellmap import CellMap
 from renderer.kernel import kernel
-from renderer.store import FIRST_ROUND, LUMINANCE, Samples, SampleStore, Spread, aligned_levels
+from renderer.slots import aligned_levels, place_in_level
+from renderer.store import FIRST_ROUND, LUMINANCE, Samples, SampleStore, Spread
 from renderer.tonemap import FIRST_CODES, THRESHOLDS, srgb_code
 from renderer.workers import Workers
 
@@ -44,13 +45,13 @@ class Squares(NamedTuple):
 
     Attributes:
         x, y, side: (n,) int32 [px].
-        slots: (n,) int64 their slots in a store.
+        slots: (n,) int32 their slots in a store.
     """
 
     x: NDArray[np.int32]
     y: NDArray[np.int32]
     side: NDArray[np.int32]
-    slots: NDArray[np.int64]
+    slots: NDArray[np.int32]
 
 
 class Verdicts:
@@ -62,7 +63,7 @@ class Verdicts:
     """
 
     def __init__(
-        self, cell_map: CellMap, slots: NDArray[np.int64], store: SampleStore, exposure: float, pool: Workers
+        self, cell_map: CellMap, slots: NDArray[np.int32], store: SampleStore, exposure: float, pool: Workers
     ) -> None:
         self._map = cell_map
         self._slots = slots
@@ -118,7 +119,7 @@ def neighbours_lacking(
     x, y, side = x[inside], y[inside], side[inside]
     sides, starts = aligned_levels(width, height)
     level = np.searchsorted(sides, side)
-    every_slot = (starts[level] + y // side * -(-width // side) + x // side).astype(np.int64)
+    every_slot = (starts[level] + place_in_level(width, side, y // side, x // side)).astype(np.int32)
     slots, once = np.unique(every_slot, return_index=True)
     lacking = number[slots] < FIRST_ROUND
     return Squares(x[once][lacking], y[once][lacking], side[once][lacking], slots[lacking])
@@ -131,7 +132,7 @@ def _decide(
     x: NDArray[np.int32],
     y: NDArray[np.int32],
     sides: NDArray[np.int32],
-    slots: NDArray[np.int64],
+    slots: NDArray[np.int32],
     mask: NDArray[np.int32],
     by_mask: bool,
     chosen: NDArray[np.int32],
@@ -165,6 +166,7 @@ def _decide(
             continue
         side = sides[cell]
         low, high = lows[slot], highs[slot]
+        first = slot - place_in_level(width, side, y[cell] // side, x[cell] // side)
         known = True
         for place in range(9):
             right, down = place % 3 - 1, place // 3 - 1
@@ -175,7 +177,7 @@ def _decide(
                 px, py = x[cell] + right * side, y[cell] + down * side
             if px < 0 or py < 0 or px >= width or py >= height:
                 continue
-            beside = slots[mask[py, px]] if by_mask else slot + down * -(-width // side) + right
+            beside = slots[mask[py, px]] if by_mask else first + place_in_level(width, side, py // side, px // side)
             if count[beside] < FIRST_ROUND:
                 known = False
                 break

@@ -67,13 +67,13 @@ def fitted(request: FrameRequest, works: Iterable[Work], rates: Rates) -> tuple[
 
 
 def affordable_samples(
-    request: FrameRequest, slots: NDArray[np.int64], store: SampleStore, wanted: int, rates: Rates, gone_ns: int
+    request: FrameRequest, slots: NDArray[np.int32], store: SampleStore, wanted: int, rates: Rates, gone_ns: int
 ) -> int:
     """As many of `wanted` samples a cell as should be traced by the deadline, if there is any.
 
     Args:
         request: the frame.
-        slots: (n,) int64 slots of its cells.
+        slots: (n,) int32 slots of its cells.
         store: what they hold.
         wanted: most samples a cell.
         rates: time for each part.

@@ -13,7 +13,7 @@ from renderer.display import Display
 from renderer.eccentricity import EyeGeometry, cell_size, eye_geometry
 from renderer.gaze import GazeBucket
 from renderer.kernel import kernel
-from renderer.store import aligned_levels
+from renderer.slots import aligned_levels, place_in_level
 
 PROBES_ACROSS = 64
 PROBES_DOWN = 36
@@ -73,7 +73,7 @@ def _probe(
             side = int(sides[level])
             known = 0
             if len(number) > 0:
-                slot = starts[level] + (py // side) * -(-width // side) + px // side
+                slot = starts[level] + place_in_level(width, side, py // side, px // side)
                 known = most if len(settled) > 0 and settled[slot] != 0 else min(most, number[slot])
             held[known] += area / (side * side)
 

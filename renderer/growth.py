@@ -78,7 +78,7 @@ def grow(
     prepared: PreparedScene,
     view: View,
     cell_map: CellMap,
-    slots: NDArray[np.int64],
+    slots: NDArray[np.int32],
     store: SampleStore,
     quality: Quality,
     wanted: int,

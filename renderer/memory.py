@@ -17,7 +17,8 @@ from renderer.frame import FrameRequest
 from renderer.gaze import Gaze, GazeBucket, bucket_of
 from renderer.prepared import PreparedScene
 from renderer.quality import Quality
-from renderer.store import SampleStore, held_by_number, slots_needed, slots_of
+from renderer.slots import pixel_slots, slots_needed, slots_of
+from renderer.store import SampleStore, held_by_number
 from renderer.workers import Workers
 
 ENTRY_BYTES = 2 << 10
@@ -30,12 +31,12 @@ class NumberedMap:
 
     Attributes:
         cells: the map.
-        slots: (n,) int64.
+        slots: (n,) int32.
         identity: stands for the map in other caches, so that they do not keep it in memory.
     """
 
     cells: CellMap
-    slots: NDArray[np.int64]
+    slots: NDArray[np.int32]
     identity: object = field(default_factory=object)
 
     @property
@@ -73,7 +74,8 @@ class Memory:
 
         def make() -> SampleStore:
             white = 1.0 / prepared.scene.exposure
-            return SampleStore(slots_needed(numbered.cells), quality.antialiasing == "adaptive", white)
+            cells = numbered.cells
+            return SampleStore(slots_needed(cells), quality.antialiasing == "adaptive", white, cells.cells)
 
         if quality.max_error is not None and quality.deadline_ms is None and request.samples is None:
             return make()
@@ -95,7 +97,8 @@ class Memory:
                 store = SampleStore(0)
             number, settled = store.samples.number, store.spread.settled
             if numbered is None and quality.map == "full":
-                yield Work(acuity, True, held_by_number(number, settled, np.arange(display.pixels), wanted))
+                slots = pixel_slots(display.width_px, display.height_px)
+                yield Work(acuity, True, held_by_number(number, settled, slots, wanted))
             elif numbered is None:
                 bucket = _bucket(quality, request.gaze)
                 yield Work(acuity, True, forecast_held(display, acuity, bucket, number, settled, wanted))

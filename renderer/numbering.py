@@ -1,7 +1,8 @@
 """In which order the cells of a map are numbered: that in which they are traced.
 
-The screen is walked tile by tile, and a tile group by group, a group being GROUP x GROUP of the smallest cells of the
-tile. Rays that are traced side by side then go more alike than along a row, and what they meet is found in less time.
+The screen is walked tile by tile, a tile strip by strip and a strip group by group, column after column, a group being
+GROUP x GROUP of the smallest cells of the tile and a strip STRIP groups high. Rays that are traced side by side then go
+more alike than along a row, and what they meet is found in less time.
 """
 
 from __future__ import annotations
@@ -13,6 +14,10 @@ from renderer.kernel import formula, kernel
 
 GROUP = 4
 """Cells along the side of a group: as many in it as rays in a packet of Embree."""
+
+STRIP = 3
+"""Groups from the top of a strip to its bottom. The smallest tile has two strips of single pixels, and one of squares
+of two: strips of a tile are parts of those of the screen, see `slots`."""
 
 
 @kernel
@@ -64,14 +69,16 @@ def _number_marked(
     """Number the squares of a tile that begin where `corners` say; return the number after the last."""
     rows, columns = corners.shape
     group_px = GROUP * _smallest_side(corners)
-    for group_row in range(0, rows, group_px):
+    strip_px = STRIP * group_px
+    for strip in range(0, rows, strip_px):
         for group_column in range(0, columns, group_px):
-            for row in range(group_row, min(rows, group_row + group_px)):
-                for column in range(group_column, min(columns, group_column + group_px)):
-                    length = int(corners[row, column])
-                    if length > 0:
-                        x[cell], y[cell], side[cell] = left + column, top + row, length
-                        cell += 1
+            for group_row in range(strip, min(rows, strip + strip_px), group_px):
+                for row in range(group_row, min(rows, group_row + group_px)):
+                    for column in range(group_column, min(columns, group_column + group_px)):
+                        length = int(corners[row, column])
+                        if length > 0:
+                            x[cell], y[cell], side[cell] = left + column, top + row, length
+                            cell += 1
     return cell
 
 
@@ -101,15 +108,19 @@ def _number_grid(
 ) -> int:
     """Number the squares of `length` pixels of a tile that is a plain grid; return the number after the last."""
     group_px = GROUP * length
-    for row in range(top, bottom, group_px):
+    strip_px = STRIP * group_px
+    for strip in range(top, bottom, strip_px):
         for column in range(left, right, group_px):
-            down = (min(bottom, row + group_px) - row) // length
             across = (min(right, column + group_px) - column) // length
-            if down == GROUP and across == GROUP and length == 1:  # the compiler takes a group of known size at once
-                _number_group(row, column, GROUP, GROUP, 1, cell, x, y, side, mask)
-            else:
-                _number_group(row, column, down, across, length, cell, x, y, side, mask)
-            cell += down * across
+            for row in range(strip, min(bottom, strip + strip_px), group_px):
+                down = (min(bottom, row + group_px) - row) // length
+                if (
+                    down == GROUP and across == GROUP and length == 1
+                ):  # the compiler takes a group of known size at once
+                    _number_group(row, column, GROUP, GROUP, 1, cell, x, y, side, mask)
+                else:
+                    _number_group(row, column, down, across, length, cell, x, y, side, mask)
+                cell += down * across
     return cell
 
 

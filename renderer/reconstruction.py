@@ -24,13 +24,13 @@ KNOWN = 1 << 24
 
 
 def reconstruct(
-    cell_map: CellMap, slots: NDArray[np.int64], samples: Samples, exposure: float, linear: bool, pool: Workers
+    cell_map: CellMap, slots: NDArray[np.int32], samples: Samples, exposure: float, linear: bool, pool: Workers
 ) -> NDArray[np.uint8] | NDArray[np.float32]:
     """The frame, each pixel the mean of its cell's samples (the paper's reconstruction, `nearest`).
 
     Args:
         cell_map: the cells.
-        slots: (n,) int64 slot of each cell in `samples`.
+        slots: (n,) int32 slot of each cell in `samples`.
         samples: sums and counts, every cell with at least one sample; the colours of cells that have none are added.
         exposure: factor from radiance to 0..1, always the same with these samples; not applied to a linear frame.
         linear: float32 radiance in place of 8-bit sRGB.
@@ -75,12 +75,12 @@ def reconstruct(
 
 
 @kernel
-def mean_radiance(samples: Samples, slots: NDArray[np.int64], exposure: np.float32, means: NDArray[np.float32]) -> None:
+def mean_radiance(samples: Samples, slots: NDArray[np.int32], exposure: np.float32, means: NDArray[np.float32]) -> None:
     """Exposed mean of each cell.
 
     Args:
         samples: the store.
-        slots: (n,) int64 slots of the cells.
+        slots: (n,) int32 slots of the cells.
         exposure: factor.
         means: (n, 3) float32, written.
     """
@@ -95,7 +95,7 @@ def mean_radiance(samples: Samples, slots: NDArray[np.int64], exposure: np.float
 @kernel
 def _colours(
     samples: Samples,
-    slots: NDArray[np.int64],
+    slots: NDArray[np.int32],
     exposure: np.float32,
     thresholds: NDArray[np.float32],
     first_codes: NDArray[np.int32],

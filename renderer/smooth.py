@@ -23,7 +23,7 @@ DISPLAY_WHITE = np.float32(1.0)
 
 
 def reconstruct_smooth(
-    cell_map: CellMap, slots: NDArray[np.int64], samples: Samples, exposure: float, linear: bool, pool: Workers
+    cell_map: CellMap, slots: NDArray[np.int32], samples: Samples, exposure: float, linear: bool, pool: Workers
 ) -> NDArray[np.uint8] | NDArray[np.float32]:
     """The frame, the means of cells interpolated over the screen.
 
@@ -31,7 +31,7 @@ def reconstruct_smooth(
 
     Args:
         cell_map: the cells.
-        slots: (n,) int64 slot of each cell in `samples`.
+        slots: (n,) int32 slot of each cell in `samples`.
         samples: sums and counts, every cell with at least one sample.
         exposure: factor from radiance to 0..1; not applied to a linear frame.
         linear: float32 radiance in place of 8-bit sRGB.

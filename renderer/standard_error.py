@@ -79,7 +79,7 @@ def stated_error(
     display: Display,
     gaze: Gaze,
     cell_map: CellMap,
-    slots: NDArray[np.int64],
+    slots: NDArray[np.int32],
     samples: Samples,
     exposure: float,
     pool: Workers,
@@ -163,7 +163,7 @@ def _is_foveal(eye: EyeGeometry, fovea: _Fovea, column: float, row: float) -> bo
 
 @formula
 def _difference_around(
-    x: int, y: int, side: int, mean: float, mask: NDArray[np.int32], slots: NDArray[np.int64], samples: Samples
+    x: int, y: int, side: int, mean: float, mask: NDArray[np.int32], slots: NDArray[np.int32], samples: Samples
 ) -> float:
     """Mean squared difference of a cell's mean from those of the cells beside, above and below; 0 if there is none."""
     height, width = mask.shape
@@ -183,7 +183,7 @@ def _sum_errors(
     x: NDArray[np.int32],
     y: NDArray[np.int32],
     sides: NDArray[np.int32],
-    slots: NDArray[np.int64],
+    slots: NDArray[np.int32],
     samples: Samples,
     first: int,
     last: int,
@@ -230,7 +230,7 @@ def _sum_guesses(
     y: NDArray[np.int32],
     sides: NDArray[np.int32],
     mask: NDArray[np.int32],
-    slots: NDArray[np.int64],
+    slots: NDArray[np.int32],
     samples: Samples,
     every: int,
     first: int,

@@ -11,13 +11,12 @@ import math
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
-from renderer.allocator import apart
-from renderer.cellmap import CellMap
+from renderer.allocator import HUGE_BYTES, apart, sparse
 from renderer.frame import Abandoned
 from renderer.kernel import kernel
 from renderer.workers import Workers
@@ -30,6 +29,11 @@ BRIGHTEST = np.float32(1e16)
 
 FIRST_ROUND = 4
 """Samples that every cell gets before it is decided which ones get more."""
+
+THIN = 8
+"""A store with more slots than so many for each cell it is made for is written thinly: a screen of 5400x3900 has 36 for
+each cell of a gaze-dependent map. Huge pages would take five times the memory, whose first use made the view's first
+frame take three times as long."""
 
 CHUNK_CELLS = 65_536
 """Cells looked up together."""
@@ -79,23 +83,31 @@ class SampleStore:
         white: luminance that the screen shows as white.
     """
 
-    def __init__(self, slots: int, adaptive: bool = False, white: float = math.inf) -> None:
-        """Room for `slots` cells; memory is taken from the system only where it is written."""
+    def __init__(self, slots: int, adaptive: bool = False, white: float = math.inf, cells: int | None = None) -> None:
+        """Room for `slots` cells; memory is taken from the system only where it is written.
+
+        Args:
+            slots: how many there are.
+            adaptive: whether it is decided for each cell how many samples it gets.
+            white: luminance that the screen shows as white.
+            cells: how many it is made for; None for all slots.
+        """
         self.white = np.float32(min(white, float(BRIGHTEST)))
         self._lock = threading.Lock()
+        thin = cells is not None and cells * THIN < slots
         decided = slots if adaptive else 0
         self.spread = Spread(
-            low=apart(decided, np.float32, zeroed=True),
-            high=apart(decided, np.float32, zeroed=True),
-            square=apart(decided, np.float32, zeroed=True),
-            settled=apart(decided, np.uint8, zeroed=True),
+            low=_room(decided, np.float32, thin),
+            high=_room(decided, np.float32, thin),
+            square=_room(decided, np.float32, thin),
+            settled=_room(decided, np.uint8, thin),
         )
         self.samples = Samples(
-            total=apart((slots, 3), np.float32),
-            shown=apart(slots, np.float32),
-            square=apart(slots, np.float32),
-            number=apart(slots, np.int32, zeroed=True),
-            colour=apart(slots, np.int32, zeroed=True),
+            total=_room(3 * slots, np.float32, thin, zeroed=False).reshape(slots, 3),
+            shown=_room(slots, np.float32, thin, zeroed=False),
+            square=_room(slots, np.float32, thin, zeroed=False),
+            number=_room(slots, np.int32, thin),
+            colour=_room(slots, np.int32, thin),
         )
 
     @contextmanager
@@ -119,73 +131,11 @@ class SampleStore:
         return sum(array.nbytes for array in (*self.samples, *self.spread))
 
 
-def aligned_sides(width: int, height: int) -> NDArray[np.int32]:
-    """Sides an aligned square can have on a screen: 1, 2, 3, 4, 6, 8, 12, ... up to its shorter side; int32 [px]."""
-    sides = [1]
-    for power in range(1, 17):
-        sides += [2**power, 3 * 2 ** (power - 1)]
-    return np.array(sorted(side for side in sides if side <= min(width, height)), dtype=np.int32)
-
-
-def aligned_slots(width: int, height: int) -> int:
-    """Number of aligned squares of all sides on a screen, those cut by its edge included."""
-    return int(aligned_levels(width, height)[1][-1])
-
-
-def slots_of(cell_map: CellMap, pool: Workers) -> NDArray[np.int64]:
-    """(n,) int64 slot of each cell: by side, row and column for aligned and full maps, else its number."""
-    slots = apart(cell_map.cells, np.int64)
-    if cell_map.kind == "scanline":
-        slots[:] = np.arange(cell_map.cells)
-        return slots
-    height, width = cell_map.mask.shape
-    sides, starts = aligned_levels(width, height)
-    first = np.zeros(int(sides[-1]) + 1, dtype=np.int64)
-    columns = np.zeros_like(first)
-    inverse = np.zeros(len(first), dtype=np.float64)
-    first[sides], columns[sides], inverse[sides] = starts[:-1], -(-width // sides), 1.0 / sides
-
-    def find(chunk: int) -> None:
-        part = slice(chunk * CHUNK_CELLS, (chunk + 1) * CHUNK_CELLS)
-        _find_slots(cell_map.x[part], cell_map.y[part], cell_map.side[part], first, columns, inverse, slots[part])
-
-    pool.run(find, -(-cell_map.cells // CHUNK_CELLS))
-    return slots
-
-
-def slots_needed(cell_map: CellMap) -> int:
-    """Number of slots of a store that can hold `cell_map`."""
-    if cell_map.kind == "scanline":
-        return cell_map.cells
-    height, width = cell_map.mask.shape
-    return aligned_slots(width, height)
-
-
-def aligned_levels(width: int, height: int) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
-    """Sides of aligned squares, (l,) int32 [px], and the slot of the first square of each, (l + 1,) int64."""
-    sides = aligned_sides(width, height)
-    squares = -(-width // sides.astype(np.int64)) * -(-height // sides)
-    return sides, np.concatenate(([0], np.cumsum(squares)))
-
-
-@kernel
-def _find_slots(
-    x: NDArray[np.int32],
-    y: NDArray[np.int32],
-    side: NDArray[np.int32],
-    first: NDArray[np.int64],
-    columns: NDArray[np.int64],
-    inverse: NDArray[np.float64],
-    slots: NDArray[np.int64],
-) -> None:
-    """Write the slots of cells; tables by side hold the first slot, squares in a row and 1 / side.
-
-    Half a pixel keeps products with the rounded inverse clear of whole numbers, which divisions would be slower at.
-    """
-    for cell in range(len(slots)):
-        length = side[cell]
-        row, column = int((y[cell] + 0.5) * inverse[length]), int((x[cell] + 0.5) * inverse[length])
-        slots[cell] = first[length] + row * columns[length] + column
+def _room(length: int, dtype: DTypeLike, thin: bool, zeroed: bool = True) -> NDArray[Any]:
+    """(length,) numbers; `thin` if few will be written: then in small pages, as huge ones would mostly lie idle."""
+    if thin and length * np.dtype(dtype).itemsize >= HUGE_BYTES:
+        return sparse(length, dtype)
+    return apart(length, dtype, zeroed)
 
 
 class Missing(NamedTuple):
@@ -204,12 +154,12 @@ class Missing(NamedTuple):
     fewest: int
 
 
-def missing_cells(store: SampleStore, slots: NDArray[np.int64], wanted: int, pool: Workers) -> Missing:
+def missing_cells(store: SampleStore, slots: NDArray[np.int32], wanted: int, pool: Workers) -> Missing:
     """The cells that have fewer than `wanted` samples and are not settled.
 
     Args:
         store: what they have.
-        slots: (n,) int64 slot of each cell, n at least 1.
+        slots: (n,) int32 slot of each cell, n at least 1.
         wanted: samples a cell.
         pool: threads; the result does not depend on their number.
     """
@@ -238,7 +188,7 @@ def missing_cells(store: SampleStore, slots: NDArray[np.int64], wanted: int, poo
 def _find_missing(
     number: NDArray[np.int32],
     settled: NDArray[np.uint8],
-    slots: NDArray[np.int64],
+    slots: NDArray[np.int32],
     first_cell: int,
     wanted: int,
     missing: NDArray[np.int32],
@@ -260,14 +210,14 @@ def _find_missing(
 
 
 def held_by_number(
-    number: NDArray[np.int32], settled: NDArray[np.uint8], slots: NDArray[np.int64], most: int
+    number: NDArray[np.int32], settled: NDArray[np.uint8], slots: NDArray[np.int32], most: int
 ) -> NDArray[np.float64]:
     """Cells by the number of samples they hold, (most + 1,) float64; those with all they need count as of `most`.
 
     Args:
         number: (slots,) int32 samples in each slot; empty if nothing was traced yet.
         settled: (slots,) uint8, 1 for a cell that needs no more; empty if there is none.
-        slots: (n,) int64 slot of each cell.
+        slots: (n,) int32 slot of each cell.
         most: samples a cell needs unless it is settled, 1 or more.
     """
     held = np.zeros(most + 1)
@@ -280,7 +230,7 @@ def held_by_number(
 
 @kernel
 def _count_held(
-    number: NDArray[np.int32], settled: NDArray[np.uint8], slots: NDArray[np.int64], held: NDArray[np.float64]
+    number: NDArray[np.int32], settled: NDArray[np.uint8], slots: NDArray[np.int32], held: NDArray[np.float64]
 ) -> None:
     most = len(held) - 1
     for cell in range(len(slots)):
@@ -294,7 +244,7 @@ def add_samples(
     samples: Samples,
     spread: Spread,
     white: np.float32,
-    slots: NDArray[np.int64],
+    slots: NDArray[np.int32],
     cells: NDArray[np.int32],
     until: NDArray[np.int32],
     radiance: NDArray[np.float32],
@@ -303,7 +253,7 @@ def add_samples(
 
     Args:
         samples, spread, white: the store.
-        slots: (n,) int64 slot of each cell of the map.
+        slots: (n,) int32 slot of each cell of the map.
         cells: (c,) int32 cells that were sampled.
         until: (c,) int32 samples each of them has then.
         radiance: (samples, 3) float32, the samples of a cell after one another.

@@ -11,7 +11,8 @@ from renderer.forecast import forecast_held
 from renderer.gaze import Gaze, bucket_of
 from renderer.pipeline import Renderer
 from renderer.quality import Quality
-from renderer.store import aligned_slots, held_by_number, slots_of
+from renderer.slots import aligned_slots, slots_of
+from renderer.store import held_by_number
 from renderer.workers import WorkerPool
 
 SCREEN = Display(960, 540, 50.0, 35.0, 60.0)

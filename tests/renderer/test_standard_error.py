@@ -21,8 +21,9 @@ from renderer.pipeline import Renderer
 from renderer.prepared import prepare
 from renderer.quality import Quality
 from renderer.scene import Material, Scene, Surroundings, Texture
+from renderer.slots import pixel_slots, slots_needed, slots_of
 from renderer.standard_error import stated_error
-from renderer.store import SampleStore, slots_of
+from renderer.store import SampleStore
 from renderer.workers import WorkerPool
 from tests.renderer.drawing import EVERYWHERE_1, WHITE, floor, shoot
 
@@ -90,12 +91,11 @@ def test_the_fovea_is_all_within_its_angle_of_the_gaze(
     """However obliquely the eye looks: cells of a pixel, each with an error of its own, weighed as that angle says."""
     display = Display(47, 31, width_cm, height_cm, distance_cm)
     rng = np.random.default_rng(5)
-    store = SampleStore(display.pixels)
-    mean, error = rng.uniform(0.0, 1.0, (2, display.pixels))
-    store.samples.number[:] = 2
-    store.samples.shown[:], store.samples.square[:] = 2.0 * mean, 2.0 * (mean * mean + error)
     cells = build_cell_map("full", display, Acuity(), GazeBucket(0.0, 0.0, 16), pool)
-    slots = slots_of(cells, pool)
+    store, slots, pixels = SampleStore(slots_needed(cells)), slots_of(cells, pool), pixel_slots(47, 31)
+    mean, error = rng.uniform(0.0, 1.0, (2, display.pixels))
+    store.samples.number[pixels] = 2
+    store.samples.shown[pixels], store.samples.square[pixels] = 2.0 * mean, 2.0 * (mean * mean + error)
     stated = stated_error(display, Gaze(*gaze), cells, slots, store.samples, 1.0, pool)
     angle = eccentricity_deg(display, Gaze(*gaze)).ravel()
     if np.abs(angle - FOVEA_DEG).min() < 1e-6:
@@ -112,10 +112,9 @@ def test_the_fovea_is_all_within_its_angle_of_the_gaze(
 def test_the_share_that_was_guessed_is_that_of_cells_with_one_sample(pool: WorkerPool) -> None:
     """In pixels of a screen whose last cells fill no group."""
     display = Display(47, 31)
-    store = SampleStore(display.pixels)
-    store.samples.number[:] = np.random.default_rng(6).integers(1, 4, display.pixels)
-    store.samples.shown[:], store.samples.square[:] = store.samples.number, store.samples.number
     cells = build_cell_map("full", display, Acuity(), GazeBucket(0.0, 0.0, 16), pool)
-    slots = slots_of(cells, pool)
+    store, slots = SampleStore(slots_needed(cells)), slots_of(cells, pool)
+    number = np.random.default_rng(6).integers(1, 4, display.pixels)
+    store.samples.number[slots] = store.samples.shown[slots] = store.samples.square[slots] = number
     stated = stated_error(display, Gaze(20.0, 10.0), cells, slots, store.samples, 1.0, pool)
-    assert stated.guessed == (store.samples.number == 1).mean()
+    assert stated.guessed == (number == 1).mean()

@@ -20,8 +20,9 @@ from renderer.gaze import Gaze, bucket_of
 from renderer.growth import grow
 from renderer.library import SceneLibrary
 from renderer.quality import Quality
+from renderer.slots import slots_needed, slots_of
 from renderer.standard_error import stated_error
-from renderer.store import SampleStore, slots_needed, slots_of
+from renderer.store import SampleStore
 from renderer.tracing import ThreadTracing
 from renderer.whitted import view_of
 from renderer.workers import WorkerPool

@@ -1,91 +1,18 @@
-"""The sample store: a cell has one place whatever the gaze, and sums do not remember how they were gathered."""
+"""The sample store: sums do not remember how they were gathered."""
 
 from __future__ import annotations
 
 import numpy as np
-import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from renderer.acuity import Acuity
-from renderer.cellmap import CellMap
-from renderer.display import Display
-from renderer.gaze import Gaze
-from renderer.pipeline import Renderer
-from renderer.quality import Quality
 from renderer.store import (
     CHUNK_CELLS,
     LUMINANCE,
     SampleStore,
     add_samples,
-    aligned_sides,
-    aligned_slots,
     missing_cells,
-    slots_needed,
-    slots_of,
 )
 from renderer.workers import WorkerPool
-
-NEAR = Display(96, 54, width_cm=5.0)
-COARSE = Acuity(scale=15.0)
-"""A screen and an eye that make cells of many sides."""
-
-
-def cell_map(renderer: Renderer, kind: str, gaze: tuple[float, float], display: Display = NEAR) -> CellMap:
-    return renderer.cell_map(display, Quality(map=kind, acuity=COARSE), Gaze(*gaze))[0]
-
-
-def identities(cells: CellMap) -> list[tuple[int, int, int]]:
-    return list(zip(cells.side.tolist(), cells.x.tolist(), cells.y.tolist(), strict=True))
-
-
-def test_sides_are_powers_of_two_and_three_times_them() -> None:
-    assert aligned_sides(1920, 1080).tolist()[:10] == [1, 2, 3, 4, 6, 8, 12, 16, 24, 32]
-    assert aligned_sides(1920, 1080).max() <= 1080
-    assert aligned_sides(1, 7).tolist() == [1]
-
-
-@settings(max_examples=30)
-@given(st.lists(st.tuples(st.floats(-50, 150), st.floats(-50, 100)), min_size=2, max_size=6))
-def test_a_cell_has_the_same_place_for_every_gaze_and_no_other_cell_has_it(
-    renderer: Renderer, pool: WorkerPool, gazes: list[tuple[float, float]]
-) -> None:
-    """Also where squares of one side could begin in the middle of those of another."""
-    cell_of_slot: dict[int, tuple[int, int, int]] = {}
-    for gaze in gazes:
-        cells = cell_map(renderer, "aligned", gaze)
-        slots = slots_of(cells, pool)
-        assert slots.min() >= 0
-        assert slots.max() < slots_needed(cells) == aligned_slots(96, 54)
-        for slot, identity in zip(slots.tolist(), identities(cells), strict=True):
-            assert cell_of_slot.setdefault(slot, identity) == identity
-    assert len(set(cell_of_slot.values())) == len(cell_of_slot)
-
-
-def test_the_maps_tried_here_have_cells_of_many_sides(renderer: Renderer) -> None:
-    sides = [set(cell_map(renderer, "aligned", gaze).side.tolist()) for gaze in ((48, 27), (0, 0), (150, 100))]
-    assert {1, 2, 3, 4, 6, 8} <= set.union(*sides)
-
-
-@pytest.mark.parametrize("size", [(1, 1), (1, 9), (9, 1), (17, 13), (96, 54)])
-def test_full_maps_share_the_places_of_single_pixels(
-    renderer: Renderer, pool: WorkerPool, size: tuple[int, int]
-) -> None:
-    display = Display(*size, width_cm=5.0)
-    cells = cell_map(renderer, "full", (0, 0), display)
-    slots = slots_of(cells, pool)
-    assert len(set(slots.tolist())) == cells.cells == display.pixels
-    aligned = cell_map(renderer, "aligned", (size[0] / 2, size[1] / 2), display)
-    place = dict(zip(identities(cells), slots.tolist(), strict=True))
-    for identity, slot in zip(identities(aligned), slots_of(aligned, pool).tolist(), strict=True):
-        assert identity[0] > 1 or place[identity] == slot
-
-
-def test_scanline_cells_have_places_of_their_map_only(renderer: Renderer, pool: WorkerPool) -> None:
-    cells = cell_map(renderer, "scanline", (10, 10))
-    np.testing.assert_array_equal(slots_of(cells, pool), np.arange(cells.cells))
-    assert slots_needed(cells) == cells.cells
 
 
 def sample(radiance: NDArray[np.float32], *parts: int) -> SampleStore:
