@@ -18,9 +18,7 @@ from renderer.lanes import (
     Lanes,
     alike,
     as_lanes,
-    each_marked,
     either,
-    lane_of,
     spread,
     vector,
 )
@@ -32,7 +30,7 @@ _INDEX = ir.IntType(32)
 _ADDRESS = ir.IntType(64)
 
 
-def _place(target: Any, builder: Any, given: Any, array: Any, indices: Sequence[Any]) -> Any:
+def place_of(target: Any, builder: Any, given: Any, array: Any, indices: Sequence[Any]) -> Any:
     """Address of an element of an array; with indices in lanes, LANES addresses."""
     held = target.make_array(given)(target, builder, array)
     address = builder.ptrtoint(held.data, _ADDRESS)
@@ -92,7 +90,7 @@ def _read(array: Any, row: Any, column: Any) -> Any:
     def generate(target: Any, builder: Any, signed: Any, arguments: Any) -> Any:
         rows = alike(target, builder, arguments[1:2], signed.args[1:2], types.int64, lanes)
         columns = alike(target, builder, arguments[2:], signed.args[2:], types.int64, lanes=False)
-        address = _place(target, builder, array, arguments[0], [*columns, *rows][:: -1 if column else 1])
+        address = place_of(target, builder, array, arguments[0], [*columns, *rows][:: -1 if column else 1])
         found = (_gathered if lanes else _element)(target, builder, kind, address)
         return _widened(builder, kind, found, lanes)
 
@@ -120,7 +118,7 @@ def _octet(_context: Any, table: Any, row: Any, first: Any) -> Any:
         (rows,) = alike(target, builder, arguments[1:2], [row], types.int64, lanes)
         each = [builder.extract_element(rows, _INDEX(lane)) for lane in range(LANES)] if lanes else [rows]
         found = [
-            _element(target, builder, types.float32, _place(target, builder, table, arguments[0], [k, column]), OCTET)
+            _element(target, builder, types.float32, place_of(target, builder, table, arguments[0], [k, column]), OCTET)
             for k in each
         ]
         if not lanes:
@@ -176,7 +174,7 @@ lane_numbers: Any = either(intrinsic(_lane_numbers), lambda first: first + np.ar
 
 def _row_place(target: Any, builder: Any, room: Any, array: Any, row: Any, given: Any) -> Any:
     """Address of a row."""
-    address = _place(target, builder, room, array, [target.cast(builder, row, given, types.int64)])
+    address = place_of(target, builder, room, array, [target.cast(builder, row, given, types.int64)])
     return builder.inttoptr(address, ir.VectorType(target.get_data_type(room.dtype), LANES).as_pointer())
 
 
@@ -222,6 +220,12 @@ keep: Any = either(intrinsic(_keep), _keep_plainly)
 whole numbers to one of int32."""
 
 
+def up_to(builder: Any, start: Any, end: Any) -> Any:
+    """Which of the numbers start, start + 1, ... are no greater than `end`."""
+    numbers = builder.add(spread(builder, start), ir.Constant(vector(types.int64), list(range(LANES))))
+    return builder.icmp_signed("<=", numbers, spread(builder, end))
+
+
 def _along(_context: Any, column: Any, first: Any, last: Any) -> Any:
     def generate(target: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
         start, end = (
@@ -229,10 +233,9 @@ def _along(_context: Any, column: Any, first: Any, last: Any) -> Any:
             for value, given in zip(arguments[1:], (first, last), strict=True)
         )
         kind = column.dtype
-        row = _element(target, builder, kind, _place(target, builder, column, arguments[0], [start]), LANES)
-        final = _element(target, builder, kind, _place(target, builder, column, arguments[0], [end]))
-        numbers = builder.add(spread(builder, start), ir.Constant(vector(types.int64), list(range(LANES))))
-        inside = builder.icmp_signed("<=", numbers, spread(builder, end))
+        row = _element(target, builder, kind, place_of(target, builder, column, arguments[0], [start]), LANES)
+        final = _element(target, builder, kind, place_of(target, builder, column, arguments[0], [end]))
+        inside = up_to(builder, start, end)
         return _widened(builder, kind, builder.select(inside, row, spread(builder, final)), lanes=True)
 
     return Lanes(_wide(column.dtype))(column, first, last), generate
@@ -245,88 +248,28 @@ along: Any = either(
 there has to be memory behind it, as `rays.make_columns` has it."""
 
 
-def _narrowed(target: Any, builder: Any, kind: Any, value: Any, given: Any) -> Any:
-    """Numbers or lanes as lanes of what an array is made of, float32 or int32."""
-    if isinstance(kind, types.Float):
-        lanes = as_lanes(target, builder, value, given, types.float64)
-        return builder.fptrunc(lanes, ir.VectorType(ir.FloatType(), LANES))
-    lanes = as_lanes(target, builder, value, given, types.int64)
-    return builder.trunc(lanes, ir.VectorType(ir.IntType(32), LANES))
-
-
-def _put(_context: Any, column: Any, first: Any, value: Any) -> Any:
+def _stretch(_context: Any, column: Any, first: Any, last: Any) -> Any:
     def generate(target: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
-        lanes = _narrowed(target, builder, column.dtype, arguments[2], value)
-        start = target.cast(builder, arguments[1], first, types.int64)
-        address = _place(target, builder, column, arguments[0], [start])
-        written = builder.store(lanes, builder.inttoptr(address, lanes.type.as_pointer()))
-        written.align = 4
-        return target.get_dummy_value()
+        start, end = (
+            target.cast(builder, value, given, types.int64)
+            for value, given in zip(arguments[1:], (first, last), strict=True)
+        )
+        kind = column.dtype
+        word = target.get_data_type(kind)
+        final = _element(target, builder, kind, place_of(target, builder, column, arguments[0], [end]))
+        inside = up_to(builder, start, end)
+        row = ir.VectorType(word, LANES)
+        pointer = builder.inttoptr(place_of(target, builder, column, arguments[0], [start]), row.as_pointer())
+        name = f"v{LANES}{'f' if isinstance(kind, types.Float) else 'i'}{kind.bitwidth}"
+        shape = ir.FunctionType(row, [pointer.type, _INDEX, inside.type, row])
+        load = cgutils.get_or_insert_function(builder.module, shape, f"llvm.masked.load.{name}.p0")
+        read = builder.call(load, [pointer, _INDEX(1), inside, spread(builder, final)])
+        return _widened(builder, kind, read, lanes=True)
 
-    return types.void(column, first, value), generate
-
-
-def _put_plainly(column: Any, first: int, value: Any) -> None:
-    count = min(LANES, len(column) - first)
-    column[first : first + count] = np.broadcast_to(value, LANES)[:count]
-
-
-put: Any = either(intrinsic(_put), _put_plainly)
-"""put(column, first, value): write lanes side by side into a C-contiguous 1-D array of float32 or int32, from `first`
-on; behind its end there has to be memory, as `rays.make_columns` has it."""
-
-
-def _put_marked(_context: Any, column: Any, first: Any, mark: Any, value: Any) -> Any:
-    def generate(target: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
-        lanes = _narrowed(target, builder, column.dtype, arguments[3], value)
-        start = target.cast(builder, arguments[1], first, types.int64)
-        pointer = builder.inttoptr(_place(target, builder, column, arguments[0], [start]), lanes.type.as_pointer())
-        shape = ir.FunctionType(lanes.type, [lanes.type, arguments[2].type, lanes.type])
-        name = f"v{LANES}{'f' if isinstance(column.dtype, types.Float) else 'i'}32"
-        compress = cgutils.get_or_insert_function(builder.module, shape, f"llvm.experimental.vector.compress.{name}")
-        packed = builder.call(compress, [lanes, arguments[2], ir.Constant(lanes.type, ir.Undefined)])
-        written = builder.store(packed, pointer)
-        written.align = 4
-        return target.get_dummy_value()
-
-    return types.void(column, first, mark, value), generate
+    return Lanes(_wide(column.dtype))(column, first, last), generate
 
 
-def _put_marked_plainly(column: Any, first: int, mark: Any, value: Any) -> None:
-    chosen = np.broadcast_to(value, LANES)[mark]
-    column[first : first + len(chosen)] = chosen
-
-
-put_marked: Any = either(intrinsic(_put_marked), _put_marked_plainly)
-"""put_marked(column, first, mark, value): the same for the marked lanes alone, these side by side. What is in the other
-rows behind is lost: to write only what is marked takes some processors 70 cycles more."""
-
-
-def _add_marked(_context: Any, table: Any, mark: Any, row: Any, red: Any, green: Any, blue: Any) -> Any:
-    def generate(target: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
-        array, marked, rows = arguments[:3]
-        columns = [
-            _narrowed(target, builder, table.dtype, value, given)
-            for value, given in zip(arguments[3:], (red, green, blue), strict=True)
-        ]
-        kind = target.get_data_type(table.dtype).as_pointer()
-        rooms = [cgutils.alloca_once_value(builder, value) for value in (rows, *columns)]
-        with each_marked(builder, marked) as lane:
-            to, *parts = (builder.load(lane_of(builder, room, lane)) for room in rooms)
-            for part, value in enumerate(parts):
-                address = _place(target, builder, table, array, [to, _ADDRESS(part)])
-                pointer = builder.inttoptr(address, kind)
-                builder.store(builder.fadd(builder.load(pointer), value), pointer)
-        return target.get_dummy_value()
-
-    return types.void(table, mark, row, red, green, blue), generate
-
-
-def _add_marked_plainly(table: Any, mark: Any, row: Any, *values: Any) -> None:
-    for part, value in enumerate(values):
-        np.add.at(table, (row[mark], part), np.broadcast_to(value, LANES)[mark].astype(table.dtype))
-
-
-add_marked: Any = either(intrinsic(_add_marked), _add_marked_plainly)
-"""add_marked(table, mark, row, red, green, blue): add lanes, as float32, to the first three columns of rows of a 2-D
-array, where marked."""
+stretch: Any = either(
+    intrinsic(_stretch), lambda column, first, last: _plain_entry(column, np.minimum(first + np.arange(LANES), last))
+)
+"""stretch(column, first, last): what `along` gives, of any C-contiguous 1-D array: nothing behind it is read."""

@@ -7,13 +7,19 @@ more alike than along a row, and what they meet is found in less time.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.gather import lane_numbers
 from renderer.kernel import formula, kernel
+from renderer.lanes import LANES, whole
+from renderer.scatter import put, put_stretch
 
-GROUP = 4
-"""Cells along the side of a group: as many in it as rays in a packet of Embree."""
+GROUP_BITS = 2
+GROUP = 1 << GROUP_BITS
+"""Cells along the side of a group: as many in it as rays in a packet of Embree, and as there are lanes."""
 
 STRIP = 3
 """Groups from the top of a strip to its bottom. The smallest tile has two strips of single pixels, and one of squares
@@ -114,14 +120,43 @@ def _number_grid(
             across = (min(right, column + group_px) - column) // length
             for row in range(strip, min(bottom, strip + strip_px), group_px):
                 down = (min(bottom, row + group_px) - row) // length
-                if (
-                    down == GROUP and across == GROUP and length == 1
-                ):  # the compiler takes a group of known size at once
-                    _number_group(row, column, GROUP, GROUP, 1, cell, x, y, side, mask)
+                if down == GROUP and across == GROUP:
+                    _number_whole_group(row, column, length, cell, x, y, side, mask)
                 else:
                     _number_group(row, column, down, across, length, cell, x, y, side, mask)
                 cell += down * across
     return cell
+
+
+@formula
+def group_places() -> tuple[Any, Any]:
+    """How far right and how far down the cells of a whole group are in it, as many of them as there are lanes."""
+    return lane_numbers(0) & GROUP - 1, lane_numbers(0) >> GROUP_BITS
+
+
+@formula
+def _number_whole_group(
+    top: int,
+    left: int,
+    length: int,
+    first: int,
+    x: NDArray[np.int32],
+    y: NDArray[np.int32],
+    side: NDArray[np.int32],
+    mask: NDArray[np.int32],
+) -> None:
+    """Number GROUP rows of GROUP squares of `length` pixels."""
+    across, down = group_places()
+    put(x, first, left + across * length)
+    put(y, first, top + down * length)
+    put(side, first, length)
+    right = left + GROUP * length - 1
+    for start in range(left, right + 1, LANES):
+        column = whole((lane_numbers(start - left) + 0.5) * (1.0 / length))
+        for row in range(GROUP):
+            numbers = column + (first + row * GROUP)
+            for line in range(top + row * length, top + (row + 1) * length):
+                put_stretch(mask[line], start, right, numbers)
 
 
 @formula

@@ -6,9 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.cellmap import CellMap
-from renderer.gather import entry, keep, lane_numbers, pick
+from renderer.gather import keep, pick, stretch
 from renderer.kernel import kernel
-from renderer.lanes import LANES, anywhere, least, single
+from renderer.lanes import LANES, anywhere, single
+from renderer.slots import at_slots
 from renderer.store import Samples
 from renderer.tonemap import FIRST_CODES, THRESHOLDS, srgb_code
 from renderer.workers import Workers
@@ -108,12 +109,12 @@ def _colours(
     total, count, held = samples.total, samples.number, samples.colour
     for row in range(len(colours)):
         first = row * LANES
-        slot = entry(slots, least(lane_numbers(first), len(slots) - 1))
-        colour = entry(held, slot)
+        slot = stretch(slots, first, len(slots) - 1)
+        colour = at_slots(held, slot, slots[first])
         if not anywhere(colour == 0):
             keep(colours, row, colour)
             continue
-        share = single(np.float64(exposure) * single(1.0 / entry(count, slot)))
+        share = single(np.float64(exposure) * single(1.0 / at_slots(count, slot, slots[first])))
         red = srgb_code(single(pick(total, slot, 0) * share), thresholds, first_codes)
         green = srgb_code(single(pick(total, slot, 1) * share), thresholds, first_codes)
         blue = srgb_code(single(pick(total, slot, 2) * share), thresholds, first_codes)

@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 
 from renderer.camera import ViewFrame
 from renderer.footprint import pencil_spread
-from renderer.gather import held, lane_numbers, put
+from renderer.gather import held, lane_numbers
 from renderer.kernel import formula, roomy_kernel
 from renderer.lanes import LANES, root
 from renderer.rays import Rays
+from renderer.scatter import put
 
 GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 MIX_1 = np.uint64(0xBF58476D1CE4E5B9)

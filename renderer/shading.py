@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.finishing import finish_off
-from renderer.gather import add_marked, along, entry, held, keep, lane_numbers
+from renderer.gather import along, entry, held, keep, lane_numbers
 from renderer.group import group_of, meet
 from renderer.kernel import formula, kernel, prefetch
 from renderer.lanes import LANES, anywhere, whole
@@ -20,6 +20,7 @@ from renderer.material_table import LIT, SPAWNS
 from renderer.places import CALLS, SENT, TURN, Places
 from renderer.prepared import Surfaces
 from renderer.rays import Hits, Rays, ShadowRays
+from renderer.scatter import add_marked
 from renderer.shadow_rays import ask_area_lights, ask_point_lights
 from renderer.spawning import CHILDREN, SHADOWS, send_on, write_children
 

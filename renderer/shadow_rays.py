@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.area_light import see_light, towards_light
-from renderer.gather import add_marked, held, put_marked
+from renderer.gather import held
 from renderer.kernel import formula, kernel
 from renderer.lanes import anywhere, how_many
 from renderer.light_samples import LightSamples, light_sample, light_seed
@@ -18,6 +18,7 @@ from renderer.places import EYE, LIGHT_ROWS, LIGHTS, START, finish_of, surface_o
 from renderer.prepared import Surfaces
 from renderer.rays import Rays, ShadowRays
 from renderer.reflectance import reflectance
+from renderer.scatter import add_marked, put_marked
 from renderer.surface import OFFSET_ULPS, Surface
 
 

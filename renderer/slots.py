@@ -13,8 +13,11 @@ from numpy.typing import NDArray
 
 from renderer.allocator import apart
 from renderer.cellmap import CellMap
-from renderer.kernel import kernel, shared
-from renderer.numbering import GROUP, STRIP
+from renderer.gather import along, entry, lane_numbers
+from renderer.kernel import formula, kernel, shared
+from renderer.lanes import LANES, anywhere
+from renderer.numbering import GROUP, STRIP, group_places
+from renderer.scatter import put
 from renderer.workers import Workers
 
 CHUNK_CELLS = 65_536
@@ -89,6 +92,14 @@ def pixel_slots(width: int, height: int) -> NDArray[np.int32]:
     return np.asarray(place_in_level(width, 1, row[:, None], column), dtype=np.int32).ravel()
 
 
+@formula
+def at_slots(column: NDArray[Any], slot: Any, first: int) -> Any:
+    """What a column of a store has for slots in lanes, the first one being `first`: read at once if they follow it."""
+    if anywhere(slot != lane_numbers(first)):
+        return entry(column, slot)
+    return along(column, first, first + LANES - 1)
+
+
 def slots_needed(cell_map: CellMap) -> int:
     """Number of slots of a store that can hold `cell_map`."""
     if cell_map.kind == "scanline":
@@ -111,7 +122,26 @@ def _find_slots(
 
     Half a pixel keeps products with the rounded inverse clear of whole numbers, which divisions would be slower at.
     """
-    for cell in range(len(slots)):
-        length = side[cell]
+    cell = 0
+    while cell < len(slots):
+        length = int(side[cell])
         row, column = int((y[cell] + 0.5) * inverse[length]), int((x[cell] + 0.5) * inverse[length])
-        slots[cell] = first[length] + _place(groups[length], row, column)
+        slot = first[length] + _place(groups[length], row, column)
+        if row % GROUP == 0 and column % GROUP == 0 and _is_group(x, y, side, cell):
+            put(slots, cell, lane_numbers(slot))
+            cell += GROUP * GROUP
+        else:
+            slots[cell] = slot
+            cell += 1
+
+
+@formula
+def _is_group(x: NDArray[np.int32], y: NDArray[np.int32], side: NDArray[np.int32], cell: int) -> bool:
+    """Whether the cells from `cell` on are all those of a whole group."""
+    last = cell + LANES - 1
+    if last >= len(x):
+        return False
+    across, down = group_places()
+    length = int(side[cell])
+    other = (along(side, cell, last) != length) | (along(x, cell, last) != x[cell] + across * length)
+    return not anywhere(other | (along(y, cell, last) != y[cell] + down * length))

@@ -26,10 +26,11 @@ from renderer.acuity import Acuity
 from renderer.cellmap import CellMap
 from renderer.display import Display
 from renderer.eccentricity import EyeGeometry, eye_geometry
-from renderer.gather import entry, keep, lane_numbers
+from renderer.gather import keep, lane_numbers, stretch
 from renderer.gaze import Gaze, GazeBucket
 from renderer.kernel import formula, kernel
-from renderer.lanes import LANES, anywhere, choose, least, most
+from renderer.lanes import LANES, anywhere, choose, most
+from renderer.slots import at_slots
 from renderer.store import Samples
 from renderer.workers import Workers
 
@@ -197,20 +198,19 @@ def _sum_errors(
     nothing = 0.0 * lane_numbers(first)
     screen, screen_area, foveal, foveal_area, guessed_area = nothing, nothing, nothing, nothing, nothing
     for start in range(first, last, LANES):
-        cell = least(lane_numbers(start), last - 1)
-        slot, side = entry(slots, cell), entry(sides, cell)
-        number = entry(count, slot)
+        slot, side = stretch(slots, start, last - 1), stretch(sides, start, last - 1)
+        number = at_slots(count, slot, slots[start])
         area = choose(lane_numbers(start) < last, 1.0 * side * side, 0.0)
         several = number > 1
         error = nothing
         if anywhere(several):
-            mean = entry(shown, slot) / number
-            variance = most(0.0, entry(square, slot) / number - mean * mean) / (number - 1.0)
+            mean = at_slots(shown, slot, slots[start]) / number
+            variance = most(0.0, at_slots(square, slot, slots[start]) / number - mean * mean) / (number - 1.0)
             error = choose(several, area * variance, 0.0)
         screen = screen + error
         screen_area = screen_area + area
         guessed_area = guessed_area + choose(several, 0.0, area)
-        column, row = entry(x, cell) + 0.5 * side, entry(y, cell) + 0.5 * side
+        column, row = stretch(x, start, last - 1) + 0.5 * side, stretch(y, start, last - 1) + 0.5 * side
         near = _may_be_foveal(fovea, column, row)
         if anywhere(near):
             near = near & _is_foveal(eye, fovea, column, row)

@@ -11,19 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from renderer.gather import (
-    OCTET,
-    add_marked,
-    along,
-    entry,
-    held,
-    keep,
-    lane_numbers,
-    octet,
-    pick,
-    put,
-    put_marked,
-)
+from renderer.gather import OCTET, along, entry, held, keep, lane_numbers, octet, pick, stretch
 from renderer.kernel import kernel
 from renderer.lanes import (
     LANES,
@@ -47,6 +35,7 @@ from renderer.lanes import (
 )
 from renderer.prepared import FACET
 from renderer.rays import make_columns
+from renderer.scatter import add_marked, put, put_marked, put_stretch
 from renderer.surface import triangle_surface, weights_at
 
 ROWS = 32
@@ -152,6 +141,37 @@ def test_numbers_come_from_their_places(dtype: type) -> None:
     np.testing.assert_array_equal(out[0], records["number"][places])
     np.testing.assert_array_equal(out[1], table[places, 3])
     np.testing.assert_array_equal(out[2 : 2 + OCTET], table[places, 2 : 2 + OCTET].T)
+
+
+@kernel
+def stretched(column: Any, whole_column: Any, first: int, last: int, floats: Any, ints: Any) -> None:
+    put_stretch(floats, first, last, stretch(column, first, last))
+    put_stretch(ints, first, last, stretch(whole_column, first, last))
+
+
+@given(st.integers(0, 50), st.integers(0, 50), st.integers(0, 3))
+def test_a_stretch_is_read_and_written_to_its_end(first: int, length: int, spare: int) -> None:
+    """The last number again beyond it; what is behind it in the array is neither read nor written."""
+    draw = np.random.default_rng(first)
+    last = first + length
+    column, numbers = draw.normal(size=last + 1 + spare).astype(np.float32), draw.integers(0, 99, last + 1 + spare)
+    column[last + 1 :] = np.nan
+    floats, ints = np.full(len(column), np.inf, np.float32), np.full(len(column), -1, np.int32)
+    stretched(column, numbers.astype(np.int32), first, last, floats, ints)
+    end = min(last + 1, first + LANES)
+    np.testing.assert_array_equal(floats[first:end], column[first:end])
+    np.testing.assert_array_equal(ints[first:end], numbers[first:end])
+    for written in (floats, ints):
+        others = np.delete(written, np.arange(first, end))
+        assert (others == (np.inf if written is floats else -1)).all()
+    held = np.zeros((1, LANES))
+    kept_stretch(column, first, last, held)
+    np.testing.assert_array_equal(held[0], column[np.minimum(first + np.arange(LANES), last)])
+
+
+@kernel
+def kept_stretch(column: Any, first: int, last: int, held: Any) -> None:
+    keep(held, 0, stretch(column, first, last))
 
 
 @kernel

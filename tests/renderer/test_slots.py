@@ -9,11 +9,15 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
 from renderer.acuity import Acuity
 from renderer.cellmap import CellMap
 from renderer.display import Display
-from renderer.gaze import Gaze
+from renderer.gather import entry, keep, lane_numbers
+from renderer.gaze import Gaze, GazeBucket
+from renderer.kernel import kernel
+from renderer.lanes import LANES
 from renderer.numbering import GROUP, STRIP
 from renderer.pipeline import Renderer
 from renderer.quality import Quality
@@ -21,6 +25,7 @@ from renderer.slots import (
     aligned_levels,
     aligned_sides,
     aligned_slots,
+    at_slots,
     pixel_slots,
     place_in_level,
     slots_needed,
@@ -113,6 +118,57 @@ def test_a_group_has_its_slots_side_by_side_and_the_group_below_in_its_strip_the
             assert place == first + GROUP * down + across
     if (row + 1) % STRIP != 0:
         assert place_in_level(width, 1, GROUP * (row + 1), GROUP * column) == first + GROUP * GROUP
+
+
+@settings(max_examples=30)
+@given(
+    st.sampled_from(["aligned", "full"]), st.integers(1, 130), st.integers(1, 90), st.floats(-50, 150), st.floats(2, 60)
+)
+def test_each_cell_has_the_slot_of_its_square(
+    renderer: Renderer, pool: WorkerPool, kind: str, width: int, height: int, gaze: float, width_cm: float
+) -> None:
+    """Whether it is found alone or with its group, and whatever cells stand beside it."""
+    cells = cell_map(renderer, kind, (gaze, 0.5 * gaze), Display(width, height, width_cm=width_cm))
+    sides, starts = aligned_levels(width, height)
+    row, column = cells.y // cells.side, cells.x // cells.side
+    expected = starts[np.searchsorted(sides, cells.side)] + place_in_level(width, cells.side, row, column)
+    np.testing.assert_array_equal(slots_of(cells, pool), expected)
+
+
+@pytest.mark.parametrize("what", ["nothing", "x", "y", "side"])
+def test_what_is_almost_a_group_is_none(pool: WorkerPool, what: str) -> None:
+    """Sixteen cells of which two have changed columns or rows, or one is larger, have slots by their own squares."""
+    across, down = np.meshgrid(np.arange(GROUP, dtype=np.int32), np.arange(GROUP, dtype=np.int32))
+    x, y, side = 2 * (8 + across.ravel()), 2 * (4 + down.ravel()), np.full(LANES, 2, np.int32)
+    if what == "x":
+        x[[5, 6]] = x[[6, 5]]
+    elif what == "y":
+        y[[5, 9]] = y[[9, 5]]
+    elif what == "side":
+        side[5] = 1
+    cells = CellMap("aligned", GazeBucket(0.0, 0.0, 16), x, y, side, np.zeros((54, 96), np.int32))
+    sides, starts = aligned_levels(96, 54)
+    expected = starts[np.searchsorted(sides, side)] + place_in_level(96, side, y // side, x // side)
+    np.testing.assert_array_equal(slots_of(cells, pool), expected)
+
+
+@kernel
+def read_at(column: NDArray[np.float32], slots: NDArray[np.int32], found: NDArray[np.float64]) -> None:
+    keep(found, 0, at_slots(column, entry(slots, lane_numbers(0)), slots[0]))
+
+
+@given(st.sampled_from(["in a row", "with gaps", "turned"]), st.integers(0, 60))
+def test_numbers_at_slots_are_those_of_each(order: str, first: int) -> None:
+    """Nothing behind the last slot is read."""
+    draw = np.random.default_rng(first)
+    slots = first + np.arange(LANES, dtype=np.int32)
+    if order == "with gaps":
+        slots[draw.integers(1, LANES) :] += 1
+    elif order == "turned":
+        draw.shuffle(slots)
+    column, found = draw.normal(size=slots.max() + 1).astype(np.float32), np.zeros((1, LANES))
+    read_at(column, slots, found)
+    np.testing.assert_array_equal(found[0], column[slots])
 
 
 @pytest.mark.parametrize("size", [(1, 1), (17, 13), (96, 54), (5, 300)])
