@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from renderer.acuity import Acuity
 from renderer.cellmap import CellMap
-from renderer.display import Display
+from renderer.display import MAX_SIDE_PX, Display
 from renderer.gather import entry, keep, lane_numbers
 from renderer.gaze import Gaze, GazeBucket
 from renderer.kernel import kernel
@@ -104,7 +104,11 @@ def test_every_square_of_every_side_has_a_slot_of_its_own(width: int, height: in
         assert len(np.unique(places)) == places.size
         assert places.min() == start
         assert places.max() < end
-    assert starts[-1] == aligned_slots(width, height) < 2**31
+    assert starts[-1] == aligned_slots(width, height)
+
+
+def test_the_slots_of_the_largest_screen_have_numbers_of_32_bits() -> None:
+    assert aligned_slots(MAX_SIDE_PX, MAX_SIDE_PX) < 2**31
 
 
 @given(st.integers(1, 200), st.integers(0, 50), st.integers(0, 50))
