@@ -6,6 +6,7 @@ favour one of them; figures are medians with their range, and ratios are taken p
 
 from __future__ import annotations
 
+import itertools
 import statistics
 import time
 from collections.abc import Callable
@@ -89,6 +90,11 @@ class RecordedRays(NamedTuple):
     nearest: list[tuple[Any, Any]]
     shadow: list[tuple[Any, Any, NDArray[np.float32]]]
 
+    @property
+    def number(self) -> int:
+        """How many they are."""
+        return sum(len(origin.x) for origin, _ in self.nearest) + sum(len(reach) for _, _, reach in self.shadow)
+
     def rows(self) -> RecordedRays:
         """The same as (n, 3) float32, as embreex takes them."""
         return RecordedRays(
@@ -100,19 +106,23 @@ class RecordedRays(NamedTuple):
 class RecordingIntersector:
     """Answers like the intersector it stands for, and keeps the rays it was asked about."""
 
-    def __init__(self, intersector: Intersector) -> None:
-        """Record what `intersector` is asked."""
+    def __init__(self, intersector: Intersector, every: int = 1) -> None:
+        """Record what `intersector` is asked, or one batch in `every` of nearest hits, and of shadows."""
         self._intersector = intersector
+        self._every = every
+        self._nearest, self._shadow = itertools.count(), itertools.count()
         self.rays = RecordedRays([], [])
 
     def nearest(self, origin: Vectors, direction: Vectors) -> Hits:
         """As `Intersector.nearest`."""
-        self.rays.nearest.append((copied(origin), copied(direction)))
+        if next(self._nearest) % self._every == 0:
+            self.rays.nearest.append((copied(origin), copied(direction)))
         return self._intersector.nearest(origin, direction)
 
     def occluded(self, origin: Vectors, direction: Vectors, reach: NDArray[np.float32]) -> NDArray[np.uint8]:
         """As `Intersector.occluded`."""
-        self.rays.shadow.append((copied(origin), copied(direction), reach.copy()))
+        if next(self._shadow) % self._every == 0:
+            self.rays.shadow.append((copied(origin), copied(direction), reach.copy()))
         return self._intersector.occluded(origin, direction, reach)
 
 

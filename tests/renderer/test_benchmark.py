@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
-from renderer.benchmark import BARE, FRAME, MAP, PACKETS, Benchmark, measure_frame
+from renderer.benchmark import BARE, FRAME, MAP, PACKETS, Benchmark, RecordingIntersector, measure_frame
 from renderer.display import Display
 from renderer.frame import FrameRequest
 from renderer.gaze import Gaze
@@ -35,6 +38,26 @@ def test_figures_belong_together(renderer: Renderer) -> None:
         ratio = figures[f"{part} / {BARE}"]
         assert ratio.unit == "ratio"
         assert figures[part].low / figures[BARE].high <= ratio.median <= figures[part].high / figures[BARE].low
+
+
+def test_all_rays_are_recorded_or_one_batch_in_many() -> None:
+    """On one thread, whose batches come in their order; the frame is the one that it is without."""
+    prepared, renderer = prepare(BUILT_IN["spheres"]()), Renderer(1)
+    request = FrameRequest(Gaze(160.0, 90.0), Display(320, 180), None, Quality(map="full", samples_per_cell=2))
+    alone = renderer.render(prepared, request)
+    recorded = {}
+    for every in (1, 3):
+        recorder = RecordingIntersector(prepared.intersector, every)
+        renderer.forget_samples()
+        frame = renderer.render(replace(prepared, intersector=recorder), request)  # type: ignore[arg-type]
+        np.testing.assert_array_equal(frame.pixels, alone.pixels)
+        recorded[every] = recorder.rays
+    assert recorded[1].number == alone.cost.rays.total
+    for all_of_them, some in zip(recorded[1], recorded[3], strict=True):
+        assert len(all_of_them) > 6
+        assert len(some) == len(all_of_them[::3])
+        for ours, theirs in zip(some, all_of_them[::3], strict=True):
+            np.testing.assert_array_equal(ours[0].x, theirs[0].x)
 
 
 @pytest.mark.bench

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import tempfile
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -23,10 +24,12 @@ from clients.command_line.peers.mitsuba_scene import (
     render_on,
 )
 from clients.command_line.peers.povray import find_povray, povray_trace_s
+from renderer.benchmark import RecordedRays, RecordingIntersector, trace_rays
 from renderer.frame import FrameRequest
 from renderer.prepared import prepare
 from renderer.quality import Quality
 from renderer.scenes import BUILT_IN
+from renderer.workers import WorkerPool
 
 MITSUBA_AIMS = {1: 4.0, 16: 1.8}
 """How many times as many samples a second, by samples a pixel."""
@@ -40,7 +43,7 @@ DIRECT = {"type": "direct", "emitter_samples": 1, "bsdf_samples": 0}
 
 
 def peer_rows(job: Job) -> tuple[Row, ...]:
-    """Each peer's time for the same work over ours."""
+    """Each peer's time for the same work over ours; where Embree traces for both, also over that of our rays alone."""
     return *_mitsuba_rows(job), *_povray_rows(job)
 
 
@@ -68,13 +71,20 @@ def _mitsuba_rows(job: Job) -> tuple[Row, ...]:
         request = _full(ours.request, samples, depth=0)
         timed_frame_ms(job.renderer, ours, request)
         _mitsuba_s(theirs, variant, samples, seed=0)  # what it compiles is kept
-        gains, rates = [], []
+        rays, gains, bounds, rates = _rays_alone(ours, request, every=samples), [], [], []
         for repeat in range(job.heavy_repeats):
             own_s = timed_frame_ms(job.renderer, ours, request) / 1e3
-            gains.append(_mitsuba_s(theirs, variant, samples, seed=repeat + 1) / own_s)
+            peer_s = _mitsuba_s(theirs, variant, samples, seed=repeat + 1)
+            gains.append(peer_s / own_s)
+            bounds.append(peer_s / rays.traced_s(ours))
             rates.append(request.display.pixels * samples / own_s / 1e6)
         note = f"{variant}; matt, 1 light, full map; ours {sorted(rates)[len(rates) // 2]:.1f} M/s"
         rows.append(measured_row("peers", what[samples], gains, aim=aim, at_least=True, note=note))
+        rows.append(
+            measured_row(
+                "peers", f"Mitsuba 3 / tracing our rays alone, {samples} a pixel", bounds, note="tracing alone"
+            )
+        )
     return tuple(rows)
 
 
@@ -103,6 +113,34 @@ def _povray_rows(job: Job) -> tuple[Row, ...]:
             gains.append(povray_trace_s(scene, request.display, depth, threads, Path(folder)) / own_s)
     note = f"1 sample a pixel, depth {request.quality.max_depth}, no textures"
     return (measured_row("peers", what, gains, aim=POVRAY_AIM, at_least=True, note=note),)
+
+
+class _RaysAlone(NamedTuple):
+    """Rays of a frame.
+
+    Attributes:
+        rays: some of them.
+        share: which share of all.
+    """
+
+    rays: RecordedRays
+    share: float
+
+    def traced_s(self, job: Job) -> float:
+        """How long all of them take to trace, as we do that, and nothing else [s]."""
+        intersector = job.prepared.intersector
+        with contextlib.closing(WorkerPool(job.renderer.threads)) as pool:
+            began = time.perf_counter()
+            trace_rays(self.rays, pool, intersector.nearest, intersector.occluded)
+            return (time.perf_counter() - began) / self.share
+
+
+def _rays_alone(job: Job, request: FrameRequest, every: int) -> _RaysAlone:
+    """The rays of a frame, of one batch in `every`: a picture of many samples has more than memory should hold."""
+    recorder = RecordingIntersector(job.prepared.intersector, every)
+    job.renderer.forget_samples()
+    frame = job.renderer.render(replace(job.prepared, intersector=recorder), request)  # type: ignore[arg-type]
+    return _RaysAlone(recorder.rays, recorder.rays.number / frame.cost.rays.total)
 
 
 def _full(request: FrameRequest, samples: int, depth: int) -> FrameRequest:
