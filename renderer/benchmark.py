@@ -103,10 +103,10 @@ class RecordedRays(NamedTuple):
         )
 
 
-class RecordingIntersector:
+class _RecordingIntersector:
     """Answers like the intersector it stands for, and keeps the rays it was asked about."""
 
-    def __init__(self, intersector: Intersector, every: int = 1) -> None:
+    def __init__(self, intersector: Intersector, every: int) -> None:
         """Record what `intersector` is asked, or one batch in `every` of nearest hits, and of shadows."""
         self._intersector = intersector
         self._every = every
@@ -126,6 +126,12 @@ class RecordingIntersector:
         return self._intersector.occluded(origin, direction, reach)
 
 
+def recording(prepared: PreparedScene, every: int = 1) -> tuple[PreparedScene, RecordedRays]:
+    """The same scene, and the rays that are traced in it from now on: all of them, or those of one batch in `every`."""
+    recorder = _RecordingIntersector(prepared.intersector, every)
+    return replace(prepared, intersector=recorder), recorder.rays  # type: ignore[arg-type]
+
+
 def measure_frame(
     renderer: Renderer, prepared: PreparedScene, request: FrameRequest, repeats: int, tick: Callable[[], None]
 ) -> Benchmark:
@@ -138,9 +144,9 @@ def measure_frame(
         repeats: how often each is timed, 1 or more.
         tick: called after each repeat, for a progress bar.
     """
-    recorder = RecordingIntersector(prepared.intersector)
+    recorded, columns = recording(prepared)
     renderer.forget_samples()
-    first = renderer.render(replace(prepared, intersector=recorder), request)  # type: ignore[arg-type]
+    first = renderer.render(recorded, request)
     pool = WorkerPool(renderer.threads)
     moved = replace(request, gaze=Gaze(request.gaze.x + GAZE_STEP_PX, request.gaze.y))
     times: dict[str, list[float]] = {
@@ -156,7 +162,7 @@ def measure_frame(
     renderer.render(prepared, moved)
     intersector = prepared.intersector
     bare, packets = (intersector.bare_nearest, intersector.bare_occluded), (intersector.nearest, intersector.occluded)
-    columns, rows = recorder.rays, recorder.rays.rows()
+    rows = columns.rows()
     trace_rays(rows, pool, *bare)  # its search tree is built at the first use
     for _ in range(repeats):
         renderer.forget_samples()

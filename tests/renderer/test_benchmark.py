@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from renderer.benchmark import BARE, FRAME, MAP, PACKETS, Benchmark, RecordingIntersector, measure_frame
+from renderer.benchmark import BARE, FRAME, MAP, PACKETS, Benchmark, measure_frame, recording
 from renderer.display import Display
 from renderer.frame import FrameRequest
 from renderer.gaze import Gaze
@@ -47,11 +45,9 @@ def test_all_rays_are_recorded_or_one_batch_in_many() -> None:
     alone = renderer.render(prepared, request)
     recorded = {}
     for every in (1, 3):
-        recorder = RecordingIntersector(prepared.intersector, every)
+        recorder, recorded[every] = recording(prepared, every)
         renderer.forget_samples()
-        frame = renderer.render(replace(prepared, intersector=recorder), request)  # type: ignore[arg-type]
-        np.testing.assert_array_equal(frame.pixels, alone.pixels)
-        recorded[every] = recorder.rays
+        np.testing.assert_array_equal(renderer.render(recorder, request).pixels, alone.pixels)
     assert recorded[1].number == alone.cost.rays.total
     for all_of_them, some in zip(recorded[1], recorded[3], strict=True):
         assert len(all_of_them) > 6

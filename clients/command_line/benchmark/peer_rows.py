@@ -24,7 +24,7 @@ from clients.command_line.peers.mitsuba_scene import (
     render_on,
 )
 from clients.command_line.peers.povray import find_povray, povray_trace_s
-from renderer.benchmark import RecordedRays, RecordingIntersector, trace_rays
+from renderer.benchmark import RecordedRays, recording, trace_rays
 from renderer.frame import FrameRequest
 from renderer.prepared import prepare
 from renderer.quality import Quality
@@ -137,10 +137,10 @@ class _RaysAlone(NamedTuple):
 
 def _rays_alone(job: Job, request: FrameRequest, every: int) -> _RaysAlone:
     """The rays of a frame, of one batch in `every`: a picture of many samples has more than memory should hold."""
-    recorder = RecordingIntersector(job.prepared.intersector, every)
+    recorded, rays = recording(job.prepared, every)
     job.renderer.forget_samples()
-    frame = job.renderer.render(replace(job.prepared, intersector=recorder), request)  # type: ignore[arg-type]
-    return _RaysAlone(recorder.rays, recorder.rays.number / frame.cost.rays.total)
+    frame = job.renderer.render(recorded, request)
+    return _RaysAlone(rays, rays.number / frame.cost.rays.total)
 
 
 def _full(request: FrameRequest, samples: int, depth: int) -> FrameRequest:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from clients.command_line.benchmark.job import Job
 from clients.command_line.benchmark.row import Row, measured_row
-from renderer.benchmark import GAZE_STEP_PX, RecordingIntersector, trace_rays
+from renderer.benchmark import GAZE_STEP_PX, recording, trace_rays
 from renderer.codec import encode
 from renderer.frame import FrameRequest
 from renderer.gaze import Gaze
@@ -72,9 +72,9 @@ def _followed(job: Job, twin: Renderer, pool: WorkerPool, request: FrameRequest)
     taken = frame.cost.time_ms
     encoded_ms = _timed_ms(partial(encode, frame.pixels, "jpeg"))
     intersector = job.prepared.intersector
-    recorder = RecordingIntersector(intersector)
-    twin.render(replace(job.prepared, intersector=recorder), request)  # type: ignore[arg-type]
-    packets_ms = _timed_ms(partial(trace_rays, recorder.rays, pool, intersector.nearest, intersector.occluded))
+    recorded, rays = recording(job.prepared)
+    twin.render(recorded, request)
+    packets_ms = _timed_ms(partial(trace_rays, rays, pool, intersector.nearest, intersector.occluded))
     cells, _ = job.renderer.cell_map(request.display, request.quality, request.gaze)
     map_ms = _copied_ms((cells.x, cells.y, cells.side, cells.mask), pool)
     picture_ms = _copied_ms((cells.mask, frame.pixels), pool)
